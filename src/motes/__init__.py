@@ -1,0 +1,1 @@
+"""motes: a particle-system engine and studio."""
