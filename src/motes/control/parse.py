@@ -1,0 +1,269 @@
+"""From a value in a document to a control, or one line that says what is wrong with it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from motes.control.color import parse_color
+from motes.control.constant import Constant, Setting
+from motes.control.control import Control, Values
+from motes.control.curve import SCOPE_OF, Curve
+from motes.control.draw import Choice, Normal, Uniform
+from motes.control.spline import Spline
+from motes.errors import likely
+from motes.parameter import SCOPES, Parameter
+
+INTERPOLATIONS = ("linear", "smooth", "monotone", "constant", "bezier")
+EXTRAPOLATIONS = ("hold", "loop", "pingpong", "extend")
+FORMS = {
+    "scene": "{ over = \"time\", keys = [[t, value], ...] }",
+    "birth": "{ mean = m, spread = s }, { normal = [mean, sigma] }, { choice = [a, b] }",
+    "particle": "{ over = \"life\", keys = [[0, value], [1, value]] }",
+}
+
+
+def parse(value: Any, parameter: Parameter) -> Control:
+    """Make the control that a document's value stands for.
+
+    Raises ValueError with one line: the parameter's name, the fault, what is allowed.
+    """
+    if isinstance(value, Control):
+        control = value
+    elif parameter.scope == "fixed":
+        return Setting(_setting(value, parameter))
+    elif isinstance(value, Mapping):
+        control = _varying(value, parameter)
+    else:
+        control = Constant(_plain(value, parameter), _tidy(value))
+    if SCOPES.index(control.scope) > SCOPES.index(parameter.scope):
+        raise ValueError(
+            f"{parameter.name} cannot vary {_how(control)}. It takes {_allowed(parameter)}."
+        )
+    low, high = control.bounds()
+    if not parameter.contains(low, high):
+        out = low if not parameter.contains(low, low) else high
+        unit = f" {parameter.unit}" if parameter.unit else ""
+        shown = f"{out:.6g}" if isinstance(control, Constant) else f"reaches {out:.6g}"
+        equals = "= " if isinstance(control, Constant) else ""
+        raise ValueError(f"{parameter.name} {equals}{shown}{unit} must be {parameter.range()}.")
+    return control
+
+
+def _tidy(value: Any) -> Any:
+    """Tuples as lists, NumPy numbers as Python ones: the form that TOML and JSON can hold."""
+    if isinstance(value, Mapping):
+        return {str(k): _tidy(v) for k, v in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_tidy(v) for v in value]
+    return value
+
+
+def _how(control: Control) -> str:
+    if isinstance(control, Curve):
+        return f"over {control.over}"
+    return "from particle to particle"
+
+
+def _allowed(parameter: Parameter) -> str:
+    """The forms that a parameter takes, in words."""
+    forms = [f"a {parameter.shape}"]
+    reach = SCOPES.index(parameter.scope)
+    forms += [FORMS[scope] for scope in SCOPES[1 : reach + 1]]
+    return " or ".join(forms)
+
+
+def _number(value: Any, name: str) -> float:
+    """A finite number."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        raise ValueError(f"{name} must be a number, not {_shown(value)}.")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ValueError(f"{name} = {number} must be finite.")
+    return number
+
+
+def _shown(value: Any) -> str:
+    """A short form of a wrong value."""
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _plain(value: Any, parameter: Parameter) -> Values:
+    """A constant of the parameter's shape."""
+    name = parameter.name
+    if parameter.shape == "color":
+        return parse_color(value, name)
+    if parameter.shape == "vector":
+        if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str) or len(value) != 3:
+            unit = f" {parameter.unit}" if parameter.unit else ""
+            raise ValueError(f"{name} must be [x, y, z]{unit}, not {_shown(value)}.")
+        return np.array([_number(v, name) for v in value])
+    return np.array([_number(value, name)])
+
+
+def _setting(value: Any, parameter: Parameter) -> Any:
+    """A value that shapes the code: a choice, a flag, a whole number, a table."""
+    name = parameter.name
+    if parameter.shape == "choice":
+        if value not in parameter.menu:
+            raise ValueError(
+                f"{name} must be one of {', '.join(parameter.menu)}, not {_shown(value)}."
+                + likely(str(value), parameter.menu)
+            )
+        return value
+    if parameter.shape == "flag":
+        if not isinstance(value, bool):
+            raise ValueError(f"{name} must be true or false, not {_shown(value)}.")
+        return value
+    if parameter.shape == "table":
+        from motes.control.tables import TABLES
+
+        return TABLES[parameter.table](_tidy(value), name)
+    number = _number(value, name)
+    if number != int(number):
+        raise ValueError(f"{name} must be a whole number, not {_shown(value)}.")
+    if not parameter.contains(number, number):
+        raise ValueError(f"{name} = {int(number)} must be {parameter.range()}.")
+    return int(number)
+
+
+def _varying(value: Mapping[str, Any], parameter: Parameter) -> Control:
+    """A control from a table of the document, told apart by the keys that it has."""
+    name, document = parameter.name, _tidy(value)
+    for marks, make in _FORMS:
+        if all(mark in value for mark in marks):
+            return make(value, parameter, document)
+    raise ValueError(
+        f"{name}: {_shown(dict(value))} is no control. It takes {_allowed(parameter)}."
+    )
+
+
+def _only(value: Mapping[str, Any], keys: Sequence[str], name: str) -> None:
+    for key in value:
+        if key not in keys:
+            raise ValueError(
+                f'{name} has no key "{key}".{likely(str(key), keys)} It takes {", ".join(keys)}.'
+            )
+
+
+def _mean_spread(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Control:
+    _only(value, ("mean", "spread"), parameter.name)
+    mean = _plain(value["mean"], parameter)
+    spread = value.get("spread", 0.0)
+    if isinstance(spread, Sequence) and not isinstance(spread, str):
+        width = np.array([_number(s, f"{parameter.name}.spread") for s in spread])
+        if parameter.shape == "color" and width.size == 3:
+            width = np.append(width, 0.0)
+        if width.size != mean.size:
+            raise ValueError(f"{parameter.name}.spread must have {mean.size} numbers.")
+    else:
+        width = np.full(mean.size, _number(spread, f"{parameter.name}.spread"))
+        if parameter.shape == "color":
+            width[3] = 0.0
+    if (width < 0).any():
+        raise ValueError(f"{parameter.name}.spread must be at least 0.")
+    return Uniform(mean - width, mean + width, document)
+
+
+def _low_high(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Control:
+    _only(value, ("low", "high"), parameter.name)
+    low, high = _plain(value["low"], parameter), _plain(value["high"], parameter)
+    if (low > high).any():
+        raise ValueError(f"{parameter.name}: low is above high.")
+    return Uniform(low, high, document)
+
+
+def _normal(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Control:
+    _only(value, ("normal",), parameter.name)
+    pair = value["normal"]
+    if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
+        raise ValueError(f"{parameter.name}: normal must be [mean, sigma], not {_shown(pair)}.")
+    mean = _plain(pair[0], parameter)
+    sigma = np.full(mean.size, _number(pair[1], f"{parameter.name}: sigma"))
+    if (sigma < 0).any():
+        raise ValueError(f"{parameter.name}: sigma must be at least 0.")
+    if parameter.shape == "color":
+        sigma[3] = 0.0
+    return Normal(mean, sigma, document)
+
+
+def _choice(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Control:
+    _only(value, ("choice",), parameter.name)
+    menu = value["choice"]
+    if not isinstance(menu, Sequence) or isinstance(menu, str) or not menu:
+        raise ValueError(f"{parameter.name}: choice must be a list of values, not {_shown(menu)}.")
+    return Choice(np.array([_plain(v, parameter) for v in menu]), document)
+
+
+def _curve(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Control:
+    name = parameter.name
+    keys_name = "stops" if "stops" in value else "keys"
+    _only(value, ("over", keys_name, "interpolation", "before", "after"), name)
+    over = value["over"]
+    if over not in SCOPE_OF:
+        raise ValueError(
+            f"{name}: over must be one of {', '.join(SCOPE_OF)}, not {_shown(over)}."
+            + likely(str(over), SCOPE_OF)
+        )
+    words = {"interpolation": INTERPOLATIONS, "before": EXTRAPOLATIONS, "after": EXTRAPOLATIONS}
+    options = {}
+    for word, menu in words.items():
+        if word in value:
+            if value[word] not in menu:
+                raise ValueError(
+                    f"{name}: {word} must be one of {', '.join(menu)}, not {_shown(value[word])}."
+                    + likely(str(value[word]), menu)
+                )
+            options[word] = value[word]
+    rows = value[keys_name]
+    if not isinstance(rows, Sequence) or isinstance(rows, str) or not rows:
+        raise ValueError(f"{name}: {keys_name} must be a list [[{over}, value], ...].")
+    times, values, handles = [], [], []
+    for row in rows:
+        if not isinstance(row, Sequence) or isinstance(row, str) or len(row) not in (2, 4):
+            raise ValueError(f"{name}: a key must be [{over}, value], not {_shown(row)}.")
+        times.append(_number(row[0], f"{name}: {over}"))
+        values.append(_plain(row[1], parameter))
+        if len(row) == 4:
+            handles.append([_handle(h, name) for h in row[2:]])
+    if handles and (options.get("interpolation") != "bezier" or len(handles) != len(times)):
+        raise ValueError(
+            f'{name}: keys with handles need interpolation = "bezier", and every key its two.'
+        )
+    if over in ("life", "random") and (min(times) < 0 or max(times) > 1):
+        raise ValueError(f"{name}: keys over {over} run from 0 to 1, not to {_shown(max(times))}.")
+    try:
+        spline = Spline(
+            np.array(times),
+            np.array(values) if parameter.width > 1 else np.array(values)[:, 0],
+            handles=np.array(handles) if handles else None,
+            **options,
+        )
+    except ValueError as fault:
+        raise ValueError(f"{name}: {fault}") from None
+    return Curve(over, spline, parameter.width, document)
+
+
+def _handle(value: Any, name: str) -> list[float]:
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
+        raise ValueError(f"{name}: a handle must be [dt, dvalue], not {_shown(value)}.")
+    return [_number(v, f"{name}: handle") for v in value]
+
+
+_FORMS = (
+    (("over", "keys"), _curve),
+    (("over", "stops"), _curve),
+    (("mean",), _mean_spread),
+    (("low", "high"), _low_high),
+    (("normal",), _normal),
+    (("choice",), _choice),
+)

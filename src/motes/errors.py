@@ -1,0 +1,74 @@
+"""What can go wrong, said in one line: where, what, the likely fix, and the menu."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+
+class MotesError(Exception):
+    """Base of every error that motes raises on purpose; its text is for the person who reads it."""
+
+    exit_code = 1
+
+
+class SimulationError(MotesError):
+    """A simulation cannot go on: a particle became infinite, a solver found no step."""
+
+
+class MissingExtra(MotesError):
+    """An optional package is not installed; the text names the `pip install` that brings it."""
+
+    exit_code = 3
+
+
+class OutputError(MotesError):
+    """A file could not be read or written."""
+
+    exit_code = 74
+
+
+class MemoryBudgetError(MotesError, MemoryError):
+    """An array would not fit into the memory budget; nothing was allocated."""
+
+    exit_code = 75
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One fault in a scene.
+
+    `path` is where it is, as keys and list positions: ("system", 0, "emit", 1, "rate").
+    """
+
+    path: tuple[str | int, ...]
+    message: str
+    line: int | None = None
+
+
+class SceneError(MotesError, ValueError):
+    """A scene is not valid. Holds every problem that was found, not only the first."""
+
+    exit_code = 2
+
+    def __init__(self, problems: Sequence[Problem] | str, source: str = "scene") -> None:
+        if isinstance(problems, str):
+            problems = [Problem((), problems)]
+        self.problems = tuple(problems)
+        self.source = source
+        super().__init__("\n".join(self.lines()))
+
+    def lines(self) -> list[str]:
+        """One line of text for each problem, in the order of the document."""
+        ordered = sorted(self.problems, key=lambda p: (p.line is None, p.line or 0))
+        return [
+            f"{self.source}:{p.line}: {p.message}" if p.line else f"{self.source}: {p.message}"
+            for p in ordered
+        ]
+
+
+def likely(word: str, menu: Iterable[str]) -> str:
+    """A hint such as ` Did you mean "rate"?`, or nothing when no entry of the menu is close."""
+    close = difflib.get_close_matches(word, list(menu), 1, 0.6)
+    return f' Did you mean "{close[0]}"?' if close else ""

@@ -1,0 +1,84 @@
+"""Reading a component's own source text: parameter help, kernels to rewrite, what a digest covers."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import linecache
+import textwrap
+from collections.abc import Callable
+from functools import lru_cache
+from types import FunctionType
+from typing import Any
+
+
+@lru_cache(maxsize=256)
+def _tree(text: str) -> ast.Module:
+    return ast.parse(text)
+
+
+def _class_node(cls: type) -> tuple[ast.ClassDef, str] | None:
+    """The class statement, found through one of the class's functions or its module's file.
+
+    A class in a notebook cell has no file that `inspect` can find, but its functions know their
+    cell.
+    """
+    functions = [f for f in vars(cls).values() if isinstance(f, FunctionType)]
+    names = [f.__code__.co_filename for f in functions]
+    try:
+        names.append(inspect.getfile(cls))
+    except (OSError, TypeError):
+        pass  # A class without functions in a notebook cell has no help text, and needs none.
+    for name in names:
+        text = "".join(linecache.getlines(name))
+        try:
+            tree = _tree(text)
+        except SyntaxError:
+            continue
+        found = [
+            n for n in ast.walk(tree) if isinstance(n, ast.ClassDef) and n.name == cls.__name__
+        ]
+        if found:
+            return found[-1], text
+    return None
+
+
+def attribute_docs(cls: type) -> dict[str, str]:
+    """The string under each declaration of a class body, on one line, by attribute name."""
+    located = _class_node(cls)
+    docs: dict[str, str] = {}
+    if located is None:
+        return docs
+    body = located[0].body
+    for statement, after in zip(body, body[1:], strict=False):
+        if (
+            isinstance(statement, ast.AnnAssign)
+            and isinstance(statement.target, ast.Name)
+            and isinstance(after, ast.Expr)
+            and isinstance(after.value, ast.Constant)
+            and isinstance(after.value.value, str)
+        ):
+            docs[statement.target.id] = " ".join(after.value.value.split())
+    return docs
+
+
+def class_source(cls: type) -> str:
+    """Source text of a class, or its kernels' byte code where there is no text."""
+    located = _class_node(cls)
+    if located is None:
+        return repr({k: f.__code__.co_code for k, f in vars(cls).items() if hasattr(f, "__code__")})
+    return ast.get_source_segment(located[1], located[0]) or ""
+
+
+def function_node(function: Callable[..., Any]) -> ast.FunctionDef:
+    """Syntax tree of a function, free of decorators, annotations and docstring."""
+    lines, _ = inspect.getsourcelines(function)
+    node = ast.parse(textwrap.dedent("".join(lines))).body[0]
+    assert isinstance(node, ast.FunctionDef)
+    node.decorator_list = []
+    node.returns = None
+    for argument in node.args.args:
+        argument.annotation = None
+    if ast.get_docstring(node) is not None:
+        node.body = node.body[1:]
+    return node
