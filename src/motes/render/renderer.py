@@ -1,0 +1,69 @@
+"""One frame: backdrop, particles, glow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from motes.render.backdrop import Backdrop, backdrop
+from motes.render.bloom import bloom
+from motes.render.camera import Camera, Vector
+from motes.render.film import Film
+from motes.render.layer import Layer
+from motes.render.picture import Picture
+from motes.render.sky import Sky
+from motes.render.solids import Solids
+from motes.render.splat import splat
+
+
+class Renderer:
+    """Draws frames on one film.
+
+    It remembers the last backdrop, so that frames in which neither camera nor solids nor sky change
+    trace nothing again.
+    """
+
+    def __init__(self, film: Film | None = None) -> None:
+        self.film = film or Film()
+        self._seen: tuple[Camera, Sky | None, Solids | None] | None = None
+        self._backdrop: Backdrop | None = None
+
+    def draw(
+        self,
+        layers: Sequence[Layer],
+        camera: Camera,
+        *,
+        shutter: float = 0.0,
+        sky: Sky | None = None,
+        solids: Solids | None = None,
+        light: Vector | None = None,
+    ) -> Picture:
+        """One frame.
+
+        Args:
+            layers: what to draw; all particles of all layers are sorted together.
+            camera: at the opening of the shutter; the backdrop does not blur.
+            shutter: how long it is open [s], the length of streaks in time.
+            sky: None leaves the picture clear where nothing is.
+            solids: hide and are hidden by particles.
+            light: what particles with opacity scatter per color; None: the light of the sky.
+        """
+        behind = self._behind(camera, sky, solids)
+        stars = sky.star_layer(camera, self.film.size) if sky else []
+        linear = splat(
+            [*layers, *stars],
+            camera,
+            behind.image,
+            shutter=shutter,
+            light=light or (sky or Sky()).light,
+            depths=behind.depths,
+        )
+        bloom(linear, self.film)
+        return Picture(linear, self.film)
+
+    def _behind(self, camera: Camera, sky: Sky | None, solids: Solids | None) -> Backdrop:
+        wanted = (replace(camera, close=None), sky, solids)
+        if self._backdrop is None or self._seen != wanted:
+            self._backdrop = backdrop(camera, self.film.size, sky, solids)
+            self._seen = wanted
+        return self._backdrop

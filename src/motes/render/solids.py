@@ -1,0 +1,191 @@
+"""Opaque solids: found by sphere tracing of a distance function, once per pixel.
+
+The tracer steps along each ray by the distance to the nearest surface, and a little farther where
+the last steps show the surface to be flat (Balint and Valasek 2018); when two such spheres of empty
+space turn out not to overlap it steps back, so nothing is jumped over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.jit import jit
+from motes.render.camera import Camera
+
+Array = NDArray[np.float32]
+
+FAR = 2000.0
+"""Solids farther than this are lost in the haze [m]."""
+
+_ZERO = np.float32(0)
+_ONE = np.float32(1)
+_FAR = np.float32(FAR)
+_TINY = np.float32(1e-30)
+_STEPS = 160
+_SHADOW_STEPS = 48
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """Solids as one distance function.
+
+    Two are equal where they draw the same picture, which is what a `Renderer` asks before it traces
+    them again.
+    """
+
+    nearest: Callable[..., Any]
+    """Inline kernel (params, x, y, z) -> (distance to the nearest surface [m], its index)."""
+
+    params: NDArray[np.floating]
+    """(p,) numbers that `nearest` reads."""
+
+    colors: Array
+    """(k, 3) linear colour of the solid of each index."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "params", np.ascontiguousarray(self.params))
+        colors = np.ascontiguousarray(self.colors, np.float32)
+        if colors.ndim != 2 or colors.shape[1] != 3:
+            raise ValueError(f"colors must have the shape (k, 3), not {colors.shape}")
+        object.__setattr__(self, "colors", colors)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Solids):
+            return NotImplemented
+        return (
+            self.nearest is other.nearest
+            and np.array_equal(self.params, other.params, equal_nan=True)
+            and np.array_equal(self.colors, other.colors)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """What rays met."""
+
+    distance: Array
+    """(n,) along the ray [m]; infinite where it met nothing."""
+
+    normal: Array
+    """(n, 3) outward unit normal."""
+
+    index: NDArray[np.int32]
+    """(n,) which solid; -1 for none."""
+
+    lit: Array
+    """(n,) part of the sun that is seen from there."""
+
+    @classmethod
+    def none(cls, n: int) -> Hits:
+        """Rays that met nothing."""
+        return cls(
+            np.full(n, np.inf, np.float32),
+            np.zeros((n, 3), np.float32),
+            np.full(n, -1, np.int32),
+            np.ones(n, np.float32),
+        )
+
+
+def trace(
+    solids: Solids,
+    camera: Camera,
+    rays: Array,
+    sun: Array,
+    softness: float,
+    pixel: float,
+    into: Hits,
+) -> None:
+    """Follow rays (n, 3) from the camera and fill `into`.
+
+    sun (3,) is the direction of the light that throws shadows; pixel is the angle of one [rad].
+    """
+    origin = np.asarray(camera.position, np.float32)
+    forward = camera.axes()[2].astype(np.float32)
+    sharpness = 0.5 / max(softness, 1e-4)
+    setting = np.array([camera.near, pixel, sharpness, *sun, *forward], np.float32)
+    kernel = _tracer(solids.nearest)
+    hits = (into.distance, into.normal, into.index, into.lit)
+    kernel(solids.params, origin, rays, setting, *hits)
+
+
+@cache
+def _tracer(nearest: Callable[..., Any]) -> Any:
+    """The tracing kernel of one distance function."""
+
+    @jit
+    def trace_rays(
+        params: Any,
+        origin: Any,
+        rays: Any,
+        setting: Any,
+        distance: Any,
+        normal: Any,
+        index: Any,
+        lit: Any,
+    ) -> None:
+        near, pixel, sharpness = setting[0], setting[1], setting[2]
+        for i in range(rays.shape[0]):
+            x, y, z = origin[0], origin[1], origin[2]
+            dx, dy, dz = rays[i, 0], rays[i, 1], rays[i, 2]
+            # Two rays, one after the other: from the eye, then from what it met to the sun.
+            t = near / (dx * setting[6] + dy * setting[7] + dz * setting[8])
+            step, before, light, close = _ZERO, _ZERO, _ONE, _ZERO
+            shadow = False
+            tries = 0
+            while tries < _STEPS:
+                tries += 1
+                found, which = nearest(params, x + t * dx, y + t * dy, z + t * dz)
+                d = np.float32(found)
+                if step > before + abs(d):
+                    # The spheres do not touch: take the cautious step after all.
+                    t += before - step
+                    step = before
+                    continue
+                close = np.float32(0.25) * pixel * t
+                if shadow:
+                    light = min(light, np.float32(0.5) + sharpness * d / t)
+                    if light <= _ZERO or t > np.float32(0.1) * _FAR or tries > _SHADOW_STEPS:
+                        break
+                elif d < close:
+                    distance[i] = t
+                    index[i] = which
+                    x, y, z = x + t * dx, y + t * dy, z + t * dz
+                    # Central differences on the corners of a tetrahedron.
+                    e = np.float32(4) * close
+                    a, _ = nearest(params, x + e, y - e, z - e)
+                    b, _ = nearest(params, x - e, y - e, z + e)
+                    c, _ = nearest(params, x - e, y + e, z - e)
+                    f, _ = nearest(params, x + e, y + e, z + e)
+                    nx = np.float32(a - b - c + f)
+                    ny = np.float32(c - a - b + f)
+                    nz = np.float32(b - a - c + f)
+                    scale = _ONE / np.float32(np.sqrt(nx * nx + ny * ny + nz * nz + _TINY))
+                    nx, ny, nz = nx * scale, ny * scale, nz * scale
+                    normal[i, 0], normal[i, 1], normal[i, 2] = nx, ny, nz
+                    dx, dy, dz = setting[3], setting[4], setting[5]
+                    if nx * dx + ny * dy + nz * dz <= _ZERO:
+                        light = _ZERO
+                        break
+                    x, y, z = x + e * nx, y + e * ny, z + e * nz
+                    shadow = True
+                    t, step, before, tries = e, _ZERO, _ZERO, 0
+                    continue
+                elif t > _FAR:
+                    break
+                forth = d
+                if step > _ZERO and not shadow:
+                    fall = before - d
+                    forth += np.float32(0.9) * d * max(step - fall, _ZERO) / (step + fall)
+                forth = max(forth, close)
+                before, step = d, forth
+                t += forth
+            smooth = min(max(light, _ZERO), _ONE)
+            lit[i] = smooth * smooth * (np.float32(3) - np.float32(2) * smooth)
+
+    return trace_rays

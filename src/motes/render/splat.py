@@ -1,0 +1,184 @@
+"""Particles to an image: project all layers, distribute them to tiles, composite each tile.
+
+A tile belongs to one thread and its list to the order of the particles, so the picture has the
+same bits for any number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.jit import blocks, share
+from motes.render.camera import Camera, Vector
+from motes.render.composite import composite
+from motes.render.layer import Layer
+from motes.render.project import TILE, distribute, project
+
+Array = NDArray[np.float32]
+
+ROWS = 16384
+"""Particles per task of projection."""
+
+WORK = 100_000
+"""Records per task of compositing: some tens of milliseconds."""
+
+PACKED_BYTES = 1 << 29
+"""Most memory for packed records; beyond it a frame is drawn in slabs of depth, front first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Depths:
+    """How far the solids are along the camera's axis [m]."""
+
+    depth: Array
+    """(h, w), infinite where there is none; (0, 0) where there are no solids at all."""
+
+    edge: NDArray[np.int32]
+    """(h, w) row of `samples` for a pixel on a silhouette, else -1."""
+
+    samples: Array
+    """(e, 4) depths within such a pixel."""
+
+
+NO_SOLIDS = Depths(
+    np.empty((0, 0), np.float32), np.empty((0, 0), np.int32), np.empty((0, 4), np.float32)
+)
+
+
+def splat(
+    layers: Sequence[Layer],
+    camera: Camera,
+    backdrop: Array,
+    *,
+    shutter: float = 0.0,
+    light: Vector = (1.0, 1.0, 1.0),
+    depths: Depths = NO_SOLIDS,
+) -> Array:
+    """Draw layers over a backdrop (h, w, 4), premultiplied; returns (h, w, 4) of the same kind.
+
+    shutter [s] is how long streaks are; light is what matter scatters per color.
+    """
+    height, width = backdrop.shape[:2]
+    across, down = -(-width // TILE), -(-height // TILE)
+    records = _project(layers, camera, (width, height), shutter, light)
+    image = np.empty((height, width, 4), np.float32)
+    slabs = _slabs(records, across, down)
+    for number, slab in enumerate(slabs):
+        starts, packed = _pack(slab, across, down)
+
+        def task(
+            band: int,
+            cuts: NDArray[np.int64] = _cuts(starts, across),
+            starts: NDArray[np.int64] = starts,
+            packed: Array = packed,
+            fresh: bool = number == 0,
+            final: bool = number == len(slabs) - 1,
+        ) -> None:
+            low, high = cuts[band], cuts[band + 1]
+            solids = (depths.depth, depths.edge, depths.samples)
+            composite(low, high, across, starts, packed, *solids, backdrop, fresh, final, image)
+
+        share(task, len(_cuts(starts, across)) - 1)
+    return image
+
+
+def _project(
+    layers: Sequence[Layer], camera: Camera, size: tuple[int, int], shutter: float, light: Vector
+) -> Array:
+    """One record per particle of all layers, (n, 8) or (n, 12)."""
+    plain = all(layer.kind != "streaks" and layer.softness <= 0 for layer in layers)
+    records = np.empty((sum(map(len, layers)), 8 if plain else 12), np.float32)
+    views = np.stack([camera.view(), (camera.close or camera).view()])
+    offset = 0
+    for layer in layers:
+        rows = records[offset : offset + len(layer)]
+        offset += len(layer)
+        moving = layer.kind == "streaks"
+        lens = np.array(
+            [
+                camera.focal(size[1]),
+                *size,
+                camera.near,
+                shutter,
+                1.0 / max(layer.softness, 1e-20),
+                layer.opacity,
+                *(layer.emission + layer.opacity * channel for channel in light),
+            ],
+            np.float32,
+        )
+        tasks = blocks(len(layer), ROWS)
+
+        def task(
+            number: int,
+            tasks: list[tuple[int, int]] = tasks,
+            layer: Layer = layer,
+            lens: Array = lens,
+            rows: Array = rows,
+            moving: bool = moving,
+        ) -> None:
+            part = slice(*tasks[number])
+            clip = np.empty((0, 2), np.float32) if layer.shutter is None else layer.shutter[part]
+            columns = (layer.position[part], layer.velocity[part], layer.color[part])
+            project(*columns, layer.size[part], clip, views, lens, moving, rows[part])
+
+        share(task, len(tasks))
+    return records
+
+
+def _pack(records: Array, across: int, down: int) -> tuple[NDArray[np.int64], Array]:
+    """Records tile by tile, each tile's in the order of the particles, and where tiles start."""
+    tasks = blocks(len(records), ROWS)
+    counts = np.zeros((len(tasks), across * down), np.int64)
+    none = np.empty((0, records.shape[1]), np.float32)
+
+    def count(number: int) -> None:
+        distribute(records[slice(*tasks[number])], counts[number], across, down, none)
+
+    share(count, len(tasks))
+    ends = np.cumsum(counts.T.ravel()).reshape(across * down, len(tasks))
+    places = np.ascontiguousarray(ends.T) - counts
+    starts = np.append(0, ends[:, -1]) if len(tasks) else np.zeros(across * down + 1, np.int64)
+    packed = np.empty((int(starts[-1]), records.shape[1]), np.float32)
+    if len(packed) == 0:
+        return starts, packed
+
+    def fill(number: int) -> None:
+        distribute(records[slice(*tasks[number])], places[number], across, down, packed)
+
+    share(fill, len(tasks))
+    return starts, packed
+
+
+def _slabs(records: Array, across: int, down: int) -> list[Array]:
+    """The records in one piece, or cut in depth, front first, where their tiles exceed memory."""
+    most = PACKED_BYTES // (4 * records.shape[1])
+    if len(records) * 4 <= most and np.all(records[:, 2] < TILE):
+        return [records]
+    low = np.minimum(records[:, :2], records[:, :2] + _way(records)) - records[:, 2:3]
+    high = np.maximum(records[:, :2], records[:, :2] + _way(records)) + records[:, 2:3]
+    limit = np.array([across, down], np.float32)
+    spans = np.clip(high / TILE + 1, 0, limit) - np.clip(low / TILE - 1, 0, limit)
+    pairs = np.where(records[:, 2] < 0, 0, spans[:, 0] * spans[:, 1]).astype(np.float64)
+    total = float(pairs.sum())
+    if total <= most:
+        return [records]
+    change = records[:, 10] / 2 if records.shape[1] > 8 else 0.0
+    shown = np.flatnonzero(records[:, 2] >= 0)
+    order = shown[np.argsort(-(records[:, 3] + change)[shown], kind="stable")]
+    slab = np.cumsum(pairs[order]) // max(most - across * down, 1)
+    return [records[part] for part in np.split(order, np.flatnonzero(np.diff(slab)) + 1)]
+
+
+def _way(records: Array) -> Array:
+    return records[:, 8:10] if records.shape[1] > 8 else np.zeros((len(records), 2), np.float32)
+
+
+def _cuts(starts: NDArray[np.int64], across: int) -> NDArray[np.int64]:
+    """Bounds of runs of tiles, each at most a row of tiles and, but for one tile, `WORK` records."""
+    tiles = len(starts) - 1
+    group = starts[:-1] // WORK + np.arange(tiles) // across * (starts[-1] // WORK + 1)
+    return np.concatenate([[0], np.flatnonzero(np.diff(group)) + 1, [tiles]])
