@@ -115,8 +115,8 @@ class Spline:
         """
         if self.values.ndim != 1:
             raise ValueError("only the integral of a scalar spline has an inverse")
-        lowest = self.bounds()[0]
-        if lowest < 0:
+        lowest, highest = self.bounds()
+        if lowest < -1e-12 * abs(highest):  # A minimum of 0 may come out as a rounding error.
             raise ValueError(
                 f"a rate must not be negative, but this spline goes down to {lowest:g}"
             )

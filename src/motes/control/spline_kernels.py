@@ -169,25 +169,29 @@ def integral_at(table: Any, t: Any) -> Any:
 
 @jit(flags=STRICT, inline=True)
 def _inner_when(table: Any, amount: Any, earliest: Any) -> Any:
-    """Earliest or latest time between the keys at which the integral is `amount`."""
-    if earliest:
-        row = _row_before(table, SUM, amount)
-    else:
-        row = _row(table, SUM, amount)
+    """Earliest or latest time between the keys at which the integral is `amount`.
+
+    The two differ where the integral rests, which it does for whole segments only: inside a
+    segment that is not zero throughout, it rises.
+    """
+    row = _row_before(table, SUM, amount) if earliest else _row(table, SUM, amount)
     segment = table[row]
+    sum_at_end = table[row + 1, SUM] if row + 1 < table.shape[0] else table[0, TOTAL]
     wanted = amount - segment[SUM]
-    if wanted <= 0.0 and earliest:
+    if wanted <= 0.0:
         return segment[START]
-    low, high, u = 0.0, 1.0, 0.5
+    if amount >= sum_at_end:
+        return segment[START] + segment[LENGTH]
+    low, high, u = 0.0, 1.0, wanted / (sum_at_end - segment[SUM])
     for _ in range(TURNS):
         error = _integral_at(segment, u) - wanted
-        if error < 0.0 or (error == 0.0 and not earliest):
+        if error < 0.0:
             low = u
         else:
             high = u
         rate = segment[LENGTH] * _value_at(segment, u) * _time_rate(segment, u)
         guess = _next_guess(u, error, rate, low, high)
-        if abs(guess - u) <= 1e-16 or (error == 0.0 and rate > 0.0):
+        if abs(guess - u) <= 1e-16 or error == 0.0:
             break
         u = guess
     return segment[START] + segment[LENGTH] * _time_at(segment, u)
