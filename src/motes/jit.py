@@ -13,11 +13,9 @@ import hashlib
 import os
 import pickle
 import platform
-import tempfile
 import types
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -26,6 +24,9 @@ import numba
 import numpy as np
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.dispatcher import Dispatcher
+
+from motes.errors import OutputError
+from motes.files import written_whole
 
 FAST = frozenset({"reassoc", "contract", "arcp", "nsz"})
 """Reorders and fuses arithmetic, but NaN and infinity stay honest (no nnan, no ninf)."""
@@ -137,19 +138,6 @@ def cache_folder() -> Path:
     return user_cache_path("motes", appauthor=False)
 
 
-@contextmanager
-def written_whole(path: Path) -> Iterator[Any]:
-    """Open a file for writing that appears under its name complete or not at all."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            yield file
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
 class _KernelCache(FunctionCache):
     """One file per compiled function, named by a hash of everything that shaped it.
 
@@ -206,7 +194,7 @@ class _KernelCache(FunctionCache):
             path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
             with written_whole(path) as file:
                 file.write(body + hashlib.sha256(body).digest())
-        except OSError:
+        except (OSError, OutputError):
             pass  # A full or read-only disk costs the next start some seconds, nothing else.
 
 
