@@ -117,7 +117,7 @@ pow = _both("pow", np.power)
 phi1 = _both("phi1", _phi1)
 sqrt = _both("sqrt", np.sqrt)
 floor = _both("floor", np.floor)
-real = _both("real", float)
+real = _both("real", np.float64)
 
 ELEMENTARY = {
     function.name: function
