@@ -18,6 +18,12 @@ Array = NDArray[np.float32]
 RAYS = 1 << 15
 """Rays per task: some milliseconds."""
 
+BLOCK = 8
+"""Width of the blocks of pixels whose rays share the first part of their way."""
+
+_HALF = np.float32(0.5)
+_UP = np.array([0.0, 0.0, 1.0], np.float32)
+
 # Four sub-samples of a pixel on a rotated grid: each row and column of a 4 x 4 grid once.
 _SUB_X = np.array([0.375, 0.875, 0.625, 0.125])
 _SUB_Y = np.array([0.125, 0.375, 0.875, 0.625])
@@ -47,9 +53,10 @@ def backdrop(
     width, height = size
     if sky is None and solids is None:
         return Backdrop(np.zeros((height, width, 4), np.float32), NO_SOLIDS)
-    y, x = np.divmod(np.arange(width * height), width)
-    rays = camera.rays(x + 0.5, y + 0.5, size)
-    hits, color = _look(camera, rays, height, sky, solids)
+    y, x = np.divmod(np.arange(width * height, dtype=np.int32), width)
+    rays = camera.rays(x + _HALF, y + _HALF, size)
+    near = np.float32(np.inf) if solids is None else _clear_way(camera, size, solids)
+    hits, color = _look(camera, rays, near, height, sky, solids)
     image = color.reshape(height, width, 4)
     if solids is None:
         return Backdrop(image, NO_SOLIDS)
@@ -57,7 +64,7 @@ def backdrop(
     sub_x = (column[:, None] + _SUB_X).ravel()
     sub_y = (row[:, None] + _SUB_Y).ravel()
     sub_rays = camera.rays(sub_x, sub_y, size)
-    sub_hits, sub_color = _look(camera, sub_rays, height, sky, solids)
+    sub_hits, sub_color = _look(camera, sub_rays, camera.near, height, sky, solids)
     image[row, column] = sub_color.reshape(-1, 4, 4).mean(axis=1)
     edge = np.full((height, width), -1, np.int32)
     edge[row, column] = np.arange(len(row))
@@ -67,28 +74,54 @@ def backdrop(
     return Backdrop(image, Depths(depth, edge, samples))
 
 
-def _look(
-    camera: Camera, rays: Array, height: int, sky: Sky | None, solids: Solids | None
-) -> tuple[Hits, Array]:
-    """What rays (n, 3) meet, and their light and coverage (n, 4)."""
+def _clear_way(camera: Camera, size: tuple[int, int], solids: Solids) -> Array:
+    """Distance up to which the ray of each pixel (h w,) is free, found for blocks of pixels."""
+    width, height = size
+    across, down = -(-width // BLOCK), -(-height // BLOCK)
+    y, x = np.divmod(np.arange(across * down, dtype=np.int32), across)
+    rays = camera.rays((x + _HALF) * BLOCK, (y + _HALF) * BLOCK, size)
     hits = Hits.none(len(rays))
+    hits.distance[:] = camera.near
+    tasks = blocks(len(rays), RAYS // BLOCK)
+    reach = BLOCK * 0.7072 / camera.focal(height)
+
+    def task(number: int) -> None:
+        rows = slice(*tasks[number])
+        trace(solids, camera.position, rays[rows], reach, _UP, 0.0, hits.part(rows), beams=True)
+
+    share(task, len(tasks))
+    square = hits.distance.reshape(down, across).repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)
+    return square[:height, :width].ravel()
+
+
+def _look(
+    camera: Camera,
+    rays: Array,
+    near: Array | np.float32 | float,
+    height: int,
+    sky: Sky | None,
+    solids: Solids | None,
+) -> tuple[Hits, Array]:
+    """What rays (n, 3) meet beyond `near`, and their light and coverage (n, 4)."""
+    hits = Hits.none(len(rays))
+    hits.distance[:] = near
     color = np.ones((len(rays), 4), np.float32)
     lamp = sky or Sky()
     numbers = lamp.numbers()
     softness = (lamp.sun or Sun()).softness
     tasks = blocks(len(rays), RAYS)
     colors = np.zeros((1, 3), np.float32) if solids is None else solids.colors
+    width = 1.0 / camera.focal(height)
 
     def task(number: int) -> None:
-        part = slice(*tasks[number])
-        some = Hits(hits.distance[part], hits.normal[part], hits.index[part], hits.lit[part])
+        rows = slice(*tasks[number])
+        some = hits.part(rows)
         if solids is not None:
-            pixel = 1.0 / camera.focal(height)
-            trace(solids, camera, rays[part], numbers[4], softness, pixel, some)
+            trace(solids, camera.position, rays[rows], width, numbers[4], softness, some)
             if some.index.max(initial=-1) >= len(colors):
                 raise ValueError(f"solid {some.index.max()} has no colour; there are {len(colors)}")
         surface = (some.distance, some.normal, some.index, some.lit)
-        shade(rays[part], *surface, colors, numbers, color[part])
+        shade(rays[rows], *surface, colors, numbers, color[rows])
 
     share(task, len(tasks))
     if sky is None:

@@ -173,7 +173,7 @@ def _draw(
     if record.size > 8:
         dx, dy, change, per_softness = record[8], record[9], record[10], record[11]
     other = inverse + change
-    if _ONE >= deepest * max(inverse, other):
+    if deepest * max(inverse, other) <= _ONE:
         return
     tested = _ONE / min(inverse, other) + _ONE / per_softness > closest
     scale = _ONE / radius

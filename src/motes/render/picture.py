@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.jit import written_whole
+from motes.files import written_whole
 from motes.render.film import Film
 from motes.render.tone import develop
 

@@ -100,12 +100,8 @@ def project(
             radius = FLOOR
         hides = min(alpha * opacity, _ONE) * alive
         gives = alpha * alive
-        length = np.float32(math.sqrt(dx * dx + dy * dy))
-        ux, uy = _ZERO, _ZERO
-        if length < SHORT * radius:
+        if dx * dx + dy * dy < SHORT * SHORT * radius * radius:
             dx, dy = _ZERO, _ZERO
-        else:
-            ux, uy = dx / length, dy / length
         left, right = min(sx, sx + dx) - radius, max(sx, sx + dx) + radius
         top, bottom = min(sy, sy + dy) - radius, max(sy, sy + dy) + radius
         if not (right > _ZERO and bottom > _ZERO and left < width and top < height):

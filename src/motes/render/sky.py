@@ -20,10 +20,10 @@ _ONE = np.float32(1)
 class Sun:
     """A far light with its glow in the sky."""
 
-    direction: Vector = (-0.5, 0.6, 0.6)
+    direction: Vector = (-0.6, -0.45, 0.7)
     """Towards the sun."""
 
-    color: Vector = (2.2, 2.0, 1.7)
+    color: Vector = (1.5, 1.36, 1.15)
     """Light on a surface that faces it."""
 
     softness: float = 0.03
@@ -48,13 +48,13 @@ class Stars:
 class Sky:
     """A gradient in the height of the view: zenith, horizon, and below it the ground."""
 
-    zenith: Vector = (0.16, 0.30, 0.58)
+    zenith: Vector = (0.07, 0.16, 0.38)
     """Linear light straight above."""
 
-    horizon: Vector = (0.62, 0.70, 0.80)
+    horizon: Vector = (0.36, 0.44, 0.54)
     """Linear light at the horizon; also the haze in which far solids fade."""
 
-    ground: Vector = (0.22, 0.20, 0.18)
+    ground: Vector = (0.13, 0.12, 0.10)
     """Linear light from below."""
 
     sun: Sun | None = Sun()
@@ -63,7 +63,7 @@ class Sky:
     stars: Stars | None = None
     """None for none."""
 
-    haze: float = 120.0
+    haze: float = 200.0
     """Distance over which solids fade into the horizon by 1/e [m]."""
 
     @classmethod
@@ -86,9 +86,7 @@ class Sky:
         if self.stars is None:
             return []
         n = self.stars.count
-        # The golden-ratio sequence in three dimensions: even, and the same everywhere.
-        step = 1.2207440846057596 ** -np.arange(1.0, 4.0)
-        u = (0.5 + np.arange(1, n + 1)[:, None] * step) % 1.0
+        u = np.random.Philox(key=1).random_raw(3 * n).reshape(n, 3) * 2.0**-64
         height, angle = 2 * u[:, 0] - 1, 2 * np.pi * u[:, 1]
         flat = np.sqrt(1 - height * height)
         away = 1e6
@@ -100,7 +98,15 @@ class Sky:
         color[:, :3] = ((1 - warm) * (0.75, 0.85, 1.0) + warm * (1.0, 0.85, 0.7)) * flux[:, None]
         width = np.full(n, 3.8 * away / camera.focal(size[1]))
         position = np.asarray(camera.position) + away * direction
-        return [Layer(*_singles(position, np.zeros((n, 3)), color, width))]
+        single = np.float32
+        return [
+            Layer(
+                position.astype(single),
+                np.zeros((n, 3), single),
+                color.astype(single),
+                width.astype(single),
+            )
+        ]
 
     def numbers(self) -> NDArray[np.float32]:
         """All of it as the kernel reads it: 5 rows of 3."""
@@ -112,10 +118,6 @@ class Sky:
 def _unit(vector: Vector) -> NDArray[np.float64]:
     length = float(np.linalg.norm(vector))
     return np.divide(vector, length) if length > 0 else np.array([0.0, 0.0, 1.0])
-
-
-def _singles(*columns: NDArray[np.float64]) -> list[NDArray[np.float32]]:
-    return [column.astype(np.float32) for column in columns]
 
 
 @jit

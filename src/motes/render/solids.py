@@ -16,19 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.jit import jit
-from motes.render.camera import Camera
+from motes.render.camera import Vector
 
 Array = NDArray[np.float32]
 
-FAR = 2000.0
+FAR = 1000.0
 """Solids farther than this are lost in the haze [m]."""
 
 _ZERO = np.float32(0)
 _ONE = np.float32(1)
 _FAR = np.float32(FAR)
 _TINY = np.float32(1e-30)
+_HALF = np.float32(0.5)
+_NOTHING = np.float32(np.inf)
+_CLOSE = np.float32(0.25)
+_SHADOW_FAR = np.float32(100)
 _STEPS = 160
-_SHADOW_STEPS = 48
+_SHADOW_STEPS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,27 +95,32 @@ class Hits:
             np.ones(n, np.float32),
         )
 
+    def part(self, rows: slice) -> Hits:
+        """Views of some rows."""
+        return Hits(self.distance[rows], self.normal[rows], self.index[rows], self.lit[rows])
+
 
 def trace(
     solids: Solids,
-    camera: Camera,
+    position: Vector,
     rays: Array,
+    width: float,
     sun: Array,
     softness: float,
-    pixel: float,
     into: Hits,
+    *,
+    beams: bool = False,
 ) -> None:
-    """Follow rays (n, 3) from the camera and fill `into`.
+    """Follow rays (n, 3) on from `into.distance`, and write what they meet into `into`.
 
-    sun (3,) is the direction of the light that throws shadows; pixel is the angle of one [rad].
+    width is the angle between rays [rad], sun (3,) the direction of the light that throws shadows.
+    With `beams` each ray stands for all that are within `width` of it: its distance becomes one up
+    to which none of them meets anything, or infinite if none does at all.
     """
-    origin = np.asarray(camera.position, np.float32)
-    forward = camera.axes()[2].astype(np.float32)
     sharpness = 0.5 / max(softness, 1e-4)
-    setting = np.array([camera.near, pixel, sharpness, *sun, *forward], np.float32)
-    kernel = _tracer(solids.nearest)
+    setting = np.array([*position, width, sharpness, *sun], np.float32)
     hits = (into.distance, into.normal, into.index, into.lit)
-    kernel(solids.params, origin, rays, setting, *hits)
+    _tracer(solids.nearest)(solids.params, setting, rays, beams, *hits)
 
 
 @cache
@@ -121,21 +130,24 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
     @jit
     def trace_rays(
         params: Any,
-        origin: Any,
-        rays: Any,
         setting: Any,
+        rays: Any,
+        beams: Any,
         distance: Any,
         normal: Any,
         index: Any,
         lit: Any,
     ) -> None:
-        near, pixel, sharpness = setting[0], setting[1], setting[2]
+        width, sharpness = setting[3], setting[4]
         for i in range(rays.shape[0]):
-            x, y, z = origin[0], origin[1], origin[2]
+            t = distance[i]
+            if not t < _FAR:
+                continue
+            x, y, z = setting[0], setting[1], setting[2]
             dx, dy, dz = rays[i, 0], rays[i, 1], rays[i, 2]
-            # Two rays, one after the other: from the eye, then from what it met to the sun.
-            t = near / (dx * setting[6] + dy * setting[7] + dz * setting[8])
-            step, before, light, close = _ZERO, _ZERO, _ONE, _ZERO
+            distance[i] = _NOTHING
+            # Two ways, one after the other: from the eye, then from what it met to the sun.
+            step, before, light = _ZERO, _ZERO, _ONE
             shadow = False
             tries = 0
             while tries < _STEPS:
@@ -147,17 +159,22 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                     t += before - step
                     step = before
                     continue
-                close = np.float32(0.25) * pixel * t
+                forth = d
                 if shadow:
-                    light = min(light, np.float32(0.5) + sharpness * d / t)
-                    if light <= _ZERO or t > np.float32(0.1) * _FAR or tries > _SHADOW_STEPS:
+                    light = min(light, _HALF + sharpness * d / t)
+                    if light <= _ZERO or t > _SHADOW_FAR:
                         break
-                elif d < close:
+                elif beams:
+                    forth -= width * t
+                    if forth < width * t:
+                        distance[i] = t
+                        break
+                elif d < _CLOSE * width * t:
                     distance[i] = t
                     index[i] = which
                     x, y, z = x + t * dx, y + t * dy, z + t * dz
                     # Central differences on the corners of a tetrahedron.
-                    e = np.float32(4) * close
+                    e = width * t
                     a, _ = nearest(params, x + e, y - e, z - e)
                     b, _ = nearest(params, x - e, y - e, z + e)
                     c, _ = nearest(params, x - e, y + e, z - e)
@@ -168,23 +185,21 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                     scale = _ONE / np.float32(np.sqrt(nx * nx + ny * ny + nz * nz + _TINY))
                     nx, ny, nz = nx * scale, ny * scale, nz * scale
                     normal[i, 0], normal[i, 1], normal[i, 2] = nx, ny, nz
-                    dx, dy, dz = setting[3], setting[4], setting[5]
+                    dx, dy, dz = setting[5], setting[6], setting[7]
                     if nx * dx + ny * dy + nz * dz <= _ZERO:
                         light = _ZERO
                         break
                     x, y, z = x + e * nx, y + e * ny, z + e * nz
                     shadow = True
-                    t, step, before, tries = e, _ZERO, _ZERO, 0
+                    t, step, before, tries = e, _ZERO, _ZERO, _STEPS - _SHADOW_STEPS
                     continue
                 elif t > _FAR:
                     break
-                forth = d
-                if step > _ZERO and not shadow:
+                elif step > _ZERO:
                     fall = before - d
                     forth += np.float32(0.9) * d * max(step - fall, _ZERO) / (step + fall)
-                forth = max(forth, close)
-                before, step = d, forth
-                t += forth
+                before, step = d, max(forth, _CLOSE * width * t)
+                t += step
             smooth = min(max(light, _ZERO), _ONE)
             lit[i] = smooth * smooth * (np.float32(3) - np.float32(2) * smooth)
 

@@ -69,10 +69,11 @@ def splat(
     slabs = _slabs(records, across, down)
     for number, slab in enumerate(slabs):
         starts, packed = _pack(slab, across, down)
+        cuts = _cuts(starts, across)
 
         def task(
             band: int,
-            cuts: NDArray[np.int64] = _cuts(starts, across),
+            cuts: NDArray[np.int64] = cuts,
             starts: NDArray[np.int64] = starts,
             packed: Array = packed,
             fresh: bool = number == 0,
@@ -82,7 +83,7 @@ def splat(
             solids = (depths.depth, depths.edge, depths.samples)
             composite(low, high, across, starts, packed, *solids, backdrop, fresh, final, image)
 
-        share(task, len(_cuts(starts, across)) - 1)
+        share(task, len(cuts) - 1)
     return image
 
 
@@ -178,7 +179,7 @@ def _way(records: Array) -> Array:
 
 
 def _cuts(starts: NDArray[np.int64], across: int) -> NDArray[np.int64]:
-    """Bounds of runs of tiles, each at most a row of tiles and, but for one tile, `WORK` records."""
+    """Bounds of runs of tiles: at most a row of them, and `WORK` records where one has not more."""
     tiles = len(starts) - 1
     group = starts[:-1] // WORK + np.arange(tiles) // across * (starts[-1] // WORK + 1)
     return np.concatenate([[0], np.flatnonzero(np.diff(group)) + 1, [tiles]])

@@ -106,10 +106,11 @@ def _tone(name: ToneMap) -> _Tone:
     octaves = np.arange((28 << 5) + 1, dtype=np.uint32)
     light = ((octaves << _SHIFT) + _FIRST_BITS).view(np.float32).astype(float)
     steps = np.arange(_CODES + 1) / _CODES
-    same = np.eye(3, dtype=np.float32)
+    same = np.eye(3)
+    tables: tuple[NDArray[np.float64], ...]
     if name == "agx":
         inset = _AGX_INSET / _AGX_INSET.sum(axis=1, keepdims=True)
-        outset = np.linalg.inv(inset)
+        outset = _SATURATION @ np.linalg.inv(inset)
         tables = inset, _agx_curve(light), outset, srgb_code(steps**2.2)
     elif name == "filmic":
         tables = same, _hable(light) / _hable(np.array(11.2)), same, srgb_code(steps)
@@ -120,7 +121,10 @@ def _tone(name: ToneMap) -> _Tone:
 
 def srgb_code(light: NDArray[np.float64]) -> NDArray[np.float64]:
     """Encode linear light, 0 to 1, by the transfer function of IEC 61966-2-1."""
-    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    code: NDArray[np.float64] = np.where(
+        light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055
+    )
+    return code
 
 
 _AGX_INSET = np.array(
@@ -131,27 +135,34 @@ _AGX_INSET = np.array(
     ]
 )
 
+# AgX alone is flat by design, to be graded: a fifth more colour about the Rec. 709 luma.
+_SATURATION = 1.2 * np.eye(3) - 0.2 * np.array([0.2126, 0.7152, 0.0722])
+
 
 def _agx_curve(light: NDArray[np.float64]) -> NDArray[np.float64]:
     """T. Sobotka's AgX: a sigmoid of log2 light from 10 stops below middle grey to 6.5 above.
 
-    Slope 2 through (grey, 0.5); toe and shoulder are x / (1 + x^p)^(1/p) with p = 3 and 3.25,
-    scaled to reach 0 and 1 at the ends of the range.
+    Slope 2.4 through (grey, 0.5); toe and shoulder are x / (1 + x^p)^(1/p) with p = 3 and 2, scaled
+    to reach 0 and 1 at the ends of the range.
     """
-    grey, slope, height = 10 / 16.5, 2.0, 0.5
+    grey, slope, height = 10 / 16.5, 2.4, 0.5
     x = np.clip((np.log2(light / 0.18) + 10) / 16.5, 0, 1) - grey
 
     def half(distance: NDArray[np.float64], reach: float, power: float) -> NDArray[np.float64]:
         scale = slope * reach * ((slope * reach / height) ** power - 1) ** (-1 / power)
         rise = slope * distance / scale
-        return scale * rise / (1 + rise**power) ** (1 / power)
+        bent: NDArray[np.float64] = scale * rise / (1 + rise**power) ** (1 / power)
+        return bent
 
     toe = half(np.maximum(-x, 0), grey, 3.0)
-    shoulder = half(np.maximum(x, 0), 1 - grey, 3.25)
+    shoulder = half(np.maximum(x, 0), 1 - grey, 2.0)
     return height - toe + shoulder
 
 
 def _hable(light: NDArray[np.float64]) -> NDArray[np.float64]:
     """J. Hable's filmic curve (Uncharted 2, GDC 2010), twice exposed as he does."""
     x = 2.0 * light
-    return (x * (0.15 * x + 0.05) + 0.004) / (x * (0.15 * x + 0.5) + 0.06) - 0.02 / 0.3
+    curve: NDArray[np.float64] = (x * (0.15 * x + 0.05) + 0.004) / (
+        x * (0.15 * x + 0.5) + 0.06
+    ) - 0.02 / 0.3
+    return curve

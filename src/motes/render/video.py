@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.jit import written_whole
+from motes.files import finished, written_whole
 
 Pixels = NDArray[np.uint8]
 
@@ -41,7 +40,7 @@ class Video:
         self._rate = Fraction(fps).limit_denominator(1001)
         if self._rate <= 0:
             raise ValueError(f"fps must be above 0, not {fps}")
-        self._part = self.path.with_name(f".{self.path.name}.{os.getpid()}.part")
+        self._whole = finished(self.path)
         self._size: tuple[int, int] | None = None
         self._container: Any = None
         self._stream: Any = None
@@ -49,6 +48,7 @@ class Video:
         self.frames = 0
 
     def __enter__(self) -> Video:
+        self._part = self._whole.__enter__()
         return self
 
     def write(self, pixels: Pixels) -> None:
@@ -73,14 +73,20 @@ class Video:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        if kind is None and self.frames == 0:
+            kind, error = ValueError, ValueError(f"{self.path.name}: a film needs a frame")
+            self._whole.__exit__(kind, error, None)
+            raise error
         try:
-            if kind is None and self.frames:
+            if kind is None:
                 self._finish()
-                os.replace(self._part, self.path)
+        except BaseException as fault:
+            kind, error, trace = type(fault), fault, fault.__traceback__
+            raise
         finally:
             if self._container is not None:
                 self._container.close()
-            self._part.unlink(missing_ok=True)
+            self._whole.__exit__(kind, error, trace)
 
     def _open(self) -> None:
         if self._suffix == ".gif" or self._size is None:

@@ -1,0 +1,139 @@
+"""Laws of the backdrop: solids are where their distance function says, and lit by the sky."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from motes.jit import jit
+from motes.render import Camera, Film, Renderer, Sky, Solids, Stars, Sun
+from motes.render.backdrop import backdrop
+
+SIZE = (96, 64)
+CAMERA = Camera(position=(0, -8, 2), look_at=(0, 0, 1), field_of_view=40)
+ONE, ZERO = np.float32(1), np.float32(0)
+
+
+@jit(inline=True)
+def plane_sphere_box(p, x, y, z):
+    """The ground z = 0, a sphere (center, radius) and a box (center, half width)."""
+    distance, index = z, 0
+    dx, dy, dz = x - p[0], y - p[1], z - p[2]
+    sphere = np.sqrt(dx * dx + dy * dy + dz * dz) - p[3]
+    if sphere < distance:
+        distance, index = sphere, 1
+    dx, dy, dz = abs(x - p[4]) - p[7], abs(y - p[5]) - p[7], abs(z - p[6]) - p[7]
+    outside_x, outside_y, outside_z = max(dx, ZERO), max(dy, ZERO), max(dz, ZERO)
+    box = np.sqrt(outside_x * outside_x + outside_y * outside_y + outside_z * outside_z)
+    box += min(max(dx, max(dy, dz)), ZERO)
+    if box < distance:
+        distance, index = box, 2
+    return distance, index
+
+
+PARAMS = np.array([-1, 0, 1, 1, 1.5, 0.5, 0.5, 0.5], np.float32)
+COLORS = np.array([[0.3, 0.3, 0.3], [0.7, 0.2, 0.1], [0.1, 0.3, 0.7]], np.float32)
+SOLIDS = Solids(plane_sphere_box, PARAMS, COLORS)
+
+
+def exact_depths():
+    """Nearest positive root along each ray: of the plane z = 0 and of the sphere, as depth."""
+    y, x = np.divmod(np.arange(SIZE[0] * SIZE[1]), SIZE[0])
+    rays = CAMERA.rays(x + 0.5, y + 0.5, SIZE).astype(float)
+    origin = np.array(CAMERA.position)
+    with np.errstate(divide="ignore"):
+        plane = np.where(rays[:, 2] < 0, -origin[2] / rays[:, 2], np.inf)
+    offset = origin - PARAMS[:3]
+    b, c = rays @ offset, offset @ offset - PARAMS[3] ** 2
+    root = b * b - c
+    sphere = np.where(root > 0, -b - np.sqrt(np.maximum(root, 0)), np.inf)
+    forward = CAMERA.axes()[2]
+    return tuple((t * (rays @ forward)).reshape(SIZE[1], SIZE[0]) for t in (plane, sphere))
+
+
+def test_depths_are_those_of_the_exact_roots():
+    """Tracing stops within a quarter of a pixel's width of the surface."""
+    plane, sphere = exact_depths()
+    moved = replace(SOLIDS, params=np.append(PARAMS[:4], [0, 0, -50, 1]))
+    depths = backdrop(CAMERA, SIZE, Sky(), moved).depths
+    inside = depths.edge < 0
+    exact = np.minimum(plane, sphere)
+    near = inside & (exact < 40)
+    # Along a ray that meets the ground at a slope s the quarter of a pixel becomes 1/s of it.
+    assert depths.depth[near] == pytest.approx(exact[near], rel=0.02)
+    ball = inside & (sphere < 0.97 * plane)
+    assert depths.depth[ball] == pytest.approx(sphere[ball], rel=3e-3)
+    assert np.isinf(depths.depth[np.isinf(exact)]).all()
+
+
+def test_silhouettes_have_sub_samples_and_smooth_colours():
+    depths = backdrop(CAMERA, SIZE, Sky(), SOLIDS).depths
+    assert len(depths.samples) == (depths.edge >= 0).sum()
+    assert 50 < len(depths.samples) < 800
+    spread = np.ptp(np.where(np.isinf(depths.samples), 1e3, depths.samples), axis=1)
+    assert (spread > 0.5).sum() > 20
+
+
+def test_a_surface_is_its_colour_times_sky_and_sun():
+    """Ground in the open: color (ambient + sun cos), ambient of the upper half, fading in haze."""
+    sky = Sky(sun=Sun(direction=(0, 0, 1), color=(1.0, 1.0, 1.0), glow=0.0), haze=1e6)
+    image = backdrop(CAMERA, SIZE, sky, SOLIDS).image
+    expected = 0.3 * (0.5 * (np.array(sky.zenith) + sky.horizon) + 1.0)
+    assert image[-1, 0, :3] == pytest.approx(expected, rel=0.01)
+
+
+def test_a_shadow_lies_where_the_sun_is_hidden():
+    """Straight below the sphere the ground is dark; off to the side it is not."""
+    sky = Sky.plain((0.1, 0.1, 0.1))
+    sky = replace(sky, sun=Sun(direction=(0, 0, 1), softness=0.0, glow=0.0), haze=1e6)
+    solids = replace(SOLIDS, params=np.append([0, 0, 2, 0.5], [0, 0, -50, 1]))
+    camera = Camera(position=(0, -6, 1.5), look_at=(0, 0, 0), field_of_view=40)
+    image = backdrop(camera, SIZE, sky, solids).image
+    dark = 0.3 * 0.1
+    assert image[32, 48, 0] == pytest.approx(dark, rel=0.02)
+    assert image[32, 10, 0] == pytest.approx(dark + 0.3 * sky.sun.color[0], rel=0.02)
+
+
+def test_the_backdrop_is_traced_once_while_nothing_changes(monkeypatch):
+    calls = []
+    monkeypatch.setattr(
+        "motes.render.renderer.backdrop", lambda *a: calls.append(a) or backdrop(*a)
+    )
+    renderer = Renderer(Film(size=SIZE))
+    same = Solids(plane_sphere_box, PARAMS.copy(), COLORS.copy())
+    first = renderer.draw([], CAMERA, sky=Sky(), solids=SOLIDS)
+    second = renderer.draw([], replace(CAMERA, close=Camera()), sky=Sky(), solids=same)
+    assert len(calls) == 1
+    assert np.array_equal(first.linear, second.linear)
+    renderer.draw([], CAMERA, sky=Sky(), solids=replace(SOLIDS, params=PARAMS * 1.01))
+    renderer.draw([], CAMERA, sky=Sky(haze=7.0), solids=SOLIDS)
+    assert len(calls) == 3
+
+
+def test_a_plain_sky_is_even_and_no_sky_is_clear():
+    image = backdrop(CAMERA, SIZE, Sky.plain((0.2, 0.3, 0.4)), None).image
+    assert image[..., :3] == pytest.approx(np.broadcast_to([0.2, 0.3, 0.4], (*SIZE[::-1], 3)))
+    assert backdrop(CAMERA, SIZE, None, None).image.max() == 0
+    behind = backdrop(CAMERA, SIZE, None, SOLIDS)
+    assert np.array_equal(behind.image[..., 3] > 0, np.isfinite(behind.depths.depth)) or (
+        (behind.image[..., 3] > 0) != np.isfinite(behind.depths.depth)
+    ).sum() <= len(behind.depths.samples)
+
+
+def test_stars_shine_above_and_solids_hide_them():
+    night = replace(Sky.plain((0.0, 0.0, 0.0)), stars=Stars(count=4000))
+    renderer = Renderer(Film(size=SIZE, bloom=0.0))
+    linear = renderer.draw([], CAMERA, sky=night, solids=SOLIDS).linear
+    assert linear[:8].max() > 0.02
+    assert linear[-16:, :, :3].max() == 0
+
+
+def test_solids_without_a_colour_or_with_bad_numbers_are_no_crash():
+    with pytest.raises(ValueError, match="no colour"):
+        backdrop(CAMERA, SIZE, Sky(), Solids(plane_sphere_box, PARAMS, COLORS[:1]))
+    broken = Solids(plane_sphere_box, np.full(8, np.nan, np.float32), COLORS)
+    assert np.isfinite(backdrop(CAMERA, SIZE, Sky(), broken).image).all()
+    inside = Camera(position=(-1, 0, 1), look_at=(-1, 0, 1), up=(0, 0, 0))
+    assert np.isfinite(backdrop(inside, (1, 1), Sky(), SOLIDS).image).all()
