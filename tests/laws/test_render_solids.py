@@ -54,15 +54,14 @@ def exact_depths():
 
 
 def test_depths_are_those_of_the_exact_roots():
-    """Tracing stops within a quarter of a pixel's width of the surface."""
+    """The last step goes to where a flat face would be, so the ground is exact."""
     plane, sphere = exact_depths()
     moved = replace(SOLIDS, params=np.append(PARAMS[:4], [0, 0, -50, 1]))
     depths = backdrop(CAMERA, SIZE, Sky(), moved).depths
     inside = depths.edge < 0
     exact = np.minimum(plane, sphere)
     near = inside & (exact < 40)
-    # Along a ray that meets the ground at a slope s the quarter of a pixel becomes 1/s of it.
-    assert depths.depth[near] == pytest.approx(exact[near], rel=0.02)
+    assert depths.depth[near] == pytest.approx(exact[near], rel=2e-3)
     ball = inside & (sphere < 0.97 * plane)
     assert depths.depth[ball] == pytest.approx(sphere[ball], rel=3e-3)
     assert np.isinf(depths.depth[np.isinf(exact)]).all()
@@ -71,7 +70,7 @@ def test_depths_are_those_of_the_exact_roots():
 def test_silhouettes_have_sub_samples_and_smooth_colours():
     depths = backdrop(CAMERA, SIZE, Sky(), SOLIDS).depths
     assert len(depths.samples) == (depths.edge >= 0).sum()
-    assert 50 < len(depths.samples) < 800
+    assert 50 < len(depths.samples) < 1200
     spread = np.ptp(np.where(np.isinf(depths.samples), 1e3, depths.samples), axis=1)
     assert (spread > 0.5).sum() > 20
 
@@ -117,9 +116,8 @@ def test_a_plain_sky_is_even_and_no_sky_is_clear():
     assert image[..., :3] == pytest.approx(np.broadcast_to([0.2, 0.3, 0.4], (*SIZE[::-1], 3)))
     assert backdrop(CAMERA, SIZE, None, None).image.max() == 0
     behind = backdrop(CAMERA, SIZE, None, SOLIDS)
-    assert np.array_equal(behind.image[..., 3] > 0, np.isfinite(behind.depths.depth)) or (
-        (behind.image[..., 3] > 0) != np.isfinite(behind.depths.depth)
-    ).sum() <= len(behind.depths.samples)
+    whole = behind.depths.edge < 0
+    assert np.array_equal(behind.image[whole, 3] == 1, np.isfinite(behind.depths.depth[whole]))
 
 
 def test_stars_shine_above_and_solids_hide_them():

@@ -27,7 +27,7 @@ _ZERO = np.float32(0)
 _ONE = np.float32(1)
 _FAR = np.float32(FAR)
 _TINY = np.float32(1e-30)
-_HALF = np.float32(0.5)
+_DARK = np.float32(1 / 64)
 _NOTHING = np.float32(np.inf)
 _CLOSE = np.float32(0.25)
 _SHADOW_FAR = np.float32(100)
@@ -117,7 +117,7 @@ def trace(
     With `beams` each ray stands for all that are within `width` of it: its distance becomes one up
     to which none of them meets anything, or infinite if none does at all.
     """
-    sharpness = 0.5 / max(softness, 1e-4)
+    sharpness = 1.0 / max(softness, 1e-4)
     setting = np.array([*position, width, sharpness, *sun], np.float32)
     hits = (into.distance, into.normal, into.index, into.lit)
     _tracer(solids.nearest)(solids.params, setting, rays, beams, *hits)
@@ -161,8 +161,11 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                     continue
                 forth = d
                 if shadow:
-                    light = min(light, _HALF + sharpness * d / t)
-                    if light <= _ZERO or t > _SHADOW_FAR:
+                    light = min(light, sharpness * d / t)
+                    if t > _SHADOW_FAR:
+                        break
+                    if light < _DARK:
+                        light = _ZERO
                         break
                 elif beams:
                     forth -= width * t
@@ -170,6 +173,8 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                         distance[i] = t
                         break
                 elif d < _CLOSE * width * t:
+                    # The rest of the way, as the last step would have it of a flat face.
+                    t += min(d * step / max(before - d, _TINY), np.float32(4) * width * t)
                     distance[i] = t
                     index[i] = which
                     x, y, z = x + t * dx, y + t * dy, z + t * dz

@@ -115,18 +115,19 @@ class Video:
 
     def _encode(self, pixels: Pixels) -> None:
         import av
+        from av.video.reformatter import ColorRange, Colorspace
 
         height, width = pixels.shape[:2]
         wide, high = self._padded(width, height)
         if (wide, high) != (width, height):
             pixels = np.pad(pixels, ((0, high - height), (0, wide - width), (0, 0)), "edge")
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(pixels), format="rgb24")
-        matrix = "itu709" if self._suffix == ".mp4" else "itu601"
+        matrix = Colorspace.ITU709 if self._suffix == ".mp4" else Colorspace.ITU601
         frame = frame.reformat(
             format=self._stream.pix_fmt,
             dst_colorspace=matrix,
-            src_color_range="jpeg",
-            dst_color_range="mpeg",
+            src_color_range=ColorRange.JPEG,
+            dst_color_range=ColorRange.MPEG,
         )
         frame.pts = self.frames
         frame.time_base = 1 / self._rate
