@@ -56,6 +56,8 @@ def jit(
         fastmath=set(flags) if flags else False,
         error_model="numpy",
         forceinline=inline,
+        no_cfunc_wrapper=True,
+        no_cpython_wrapper=inline,
     )(function)
     if not inline and not numba.config.DISABLE_JIT:
         compiled._cache = _KernelCache(function, ",".join(sorted(flags)))
@@ -138,6 +140,15 @@ def cache_folder() -> Path:
     return user_cache_path("motes", appauthor=False)
 
 
+_listener: Callable[[str], None] | None = None
+
+
+def listen(listener: Callable[[str], None] | None) -> None:
+    """Call `listener` with a kernel's name each time that one is not in the cache, or nobody."""
+    global _listener
+    _listener = listener
+
+
 class _KernelCache(FunctionCache):
     """One file per compiled function, named by a hash of everything that shaped it.
 
@@ -179,11 +190,13 @@ class _KernelCache(FunctionCache):
         try:
             content = self._file(sig, target_context.codegen()).read_bytes()
         except OSError:
-            return None
+            content = b""
         body, checksum = content[:-32], content[-32:]
-        if hashlib.sha256(body).digest() != checksum:
-            return None
-        return self._impl.rebuild(target_context, pickle.loads(body))
+        if hashlib.sha256(body).digest() == checksum:
+            return self._impl.rebuild(target_context, pickle.loads(body))
+        if _listener is not None:
+            _listener(self._py_func.__name__)
+        return None
 
     def _save_overload(self, sig: Any, data: Any) -> None:
         if not self._impl.check_cachable(data):

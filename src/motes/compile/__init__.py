@@ -1,0 +1,1 @@
+"""From components to machine code: one fused module for each system of a scene."""

@@ -1,0 +1,263 @@
+"""Motion: the right-hand side and one step of one particle, from components and a method's table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from motes.catalog import Component
+from motes.compile.text import AXES, STATE, Text, packed
+from motes.control.control import Control
+from motes.tableau import Explicit, Method, Splitting
+
+PARTICLE = {"age": "age", "id": "id"}
+"""Columns of `q` that the engine computes itself."""
+
+KEPT = ("life", "mass")
+"""Traits whose value at birth holds for life."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What moves a system: components with their addresses, traits, method."""
+
+    forces: tuple[tuple[str, Component], ...]
+    flows: tuple[tuple[str, Component], ...]
+    retire: tuple[tuple[str, Component], ...]
+    traits: dict[str, tuple[str, Control]]
+    """Values of the system by name (life, mass, size, color): address and control."""
+    method: Method
+
+    @property
+    def inertial(self) -> bool:
+        """Whether particles have a velocity of their own: all but those that flows alone carry."""
+        return bool(self.forces) or not self.flows
+
+    @property
+    def mortal(self) -> bool:
+        """Whether anything retires particles."""
+        return bool(self.retire)
+
+    def needs(self) -> set[str]:
+        """Columns that the components ask for."""
+        parts = (*self.forces, *self.flows, *self.retire)
+        return {need for _, component in parts for need in component.needs}
+
+
+def write_motion(text: Text, motion: Motion) -> None:
+    """Write `rate`, or `kick` and `drift`, and `advance` into the text.
+
+    `advance(x, ..., age, C, S_0, ..., L, t_0, ..., h)` takes one particle through a step of length
+    h; S_i and t_i are the scene's values and the time at the method's i-th stage.
+    """
+    writer = _Writer(text, motion)
+    writer.right_hand_side()
+    if isinstance(motion.method, Explicit):
+        writer.explicit(motion.method)
+    else:
+        writer.splitting(motion.method)
+    if motion.mortal:
+        writer.dies()
+
+
+def stage_times(method: Method) -> tuple[float, ...]:
+    """Times at which the scene's values are needed, as shares of the step."""
+    if isinstance(method, Explicit):
+        return method.c
+    kicks = method.times
+    middles = [(a + b) / 2 for a, b in zip(kicks, kicks[1:], strict=False)]
+    return tuple(sorted({*kicks, *middles}))
+
+
+class _Writer:
+    """Writes one system's motion; `self.text` collects values, kernels and source."""
+
+    def __init__(self, text: Text, motion: Motion) -> None:
+        self.text, self.motion = text, motion
+        self.particle = self._particle()
+        self.forces = [
+            (c, self.text.parameters(c, address)) for address, c in motion.forces
+        ]
+        self.flows = [(c, self.text.parameters(c, address)) for address, c in motion.flows]
+        self.retire = [(c, self.text.parameters(c, address)) for address, c in motion.retire]
+
+    def _particle(self) -> str:
+        """An expression for `q`: position, velocity, and the columns that components need."""
+        fields = {name: name for name in STATE}
+        for need in sorted(self.motion.needs()):
+            if need in PARTICLE:
+                fields[need] = PARTICLE[need]
+            else:
+                address, control = self._trait(need)
+                kept = need in KEPT
+                fields[need] = packed(self.text.values.add(control, address, need, at_birth=kept))
+        return self.text.record("Q", fields)
+
+    def _trait(self, name: str) -> tuple[str, Control]:
+        from motes.errors import SceneError
+
+        if name in self.motion.traits:
+            return self.motion.traits[name]
+        menu = ", ".join(sorted({*self.motion.traits, *PARTICLE}))
+        raise SceneError(f'a component needs "{name}", which the system has not. It has {menu}.')
+
+    def _preamble(self) -> str:
+        """What curves over life and speed run over; unused lines cost nothing."""
+        lines = ""
+        if "life" in self.text.values.over:
+            lines += f"    along_life = age / {packed(self._life())}\n"
+        if "speed" in self.text.values.over:
+            lines += "    speed = sqrt(vx * vx + vy * vy + vz * vz)\n"
+        return lines
+
+    def _life(self) -> list[str]:
+        address, control = self._trait("life")
+        return self.text.values.add(control, address, "life", at_birth=True)
+
+    def _sum(self, parts: list[str], vector: tuple[str, str, str]) -> str:
+        """Source that adds up calls which give three numbers each into three names."""
+        if not parts:
+            return "".join(f"    {name} = F(0.0)\n" for name in vector)
+        lines = f"    {', '.join(vector)} = {parts[0]}\n"
+        for call in parts[1:]:
+            lines += f"    dx, dy, dz = {call}\n"
+            lines += "".join(
+                f"    {name} += {d}\n" for name, d in zip(vector, ("dx", "dy", "dz"), strict=True)
+            )
+        return lines
+
+    def right_hand_side(self) -> None:
+        """`carried`: the flows' velocity; `pushed`: acceleration and relaxation, all forces."""
+        arguments = ", ".join(STATE)
+        calls = [
+            f"{self.text.kernel(type(c), 'velocity')}({p}, {self.particle}, t)"
+            for c, p in self.flows
+        ]
+        direct, relaxing = [], []
+        for c, p in self.forces:
+            for name, found in (("acceleration", direct), ("relaxation", relaxing)):
+                if c.kernel(name) is not None:
+                    found.append(f"{self.text.kernel(type(c), name)}({p}, {self.particle}, t)")
+                    break
+        if "life" in self.text.values.over:
+            self._life()
+        head = f"({arguments}, age, C, S, L, t):\n{self._preamble()}"
+        self.text.add(
+            f"@inline\ndef carried{head}"
+            + self._sum(calls, ("ux", "uy", "uz"))
+            + "    return ux, uy, uz\n"
+        )
+        body = self._sum(direct, ("ax", "ay", "az"))
+        body += "    k = F(0.0)\n    bx = F(0.0)\n    by = F(0.0)\n    bz = F(0.0)\n"
+        for call in relaxing:
+            body += f"    rate, ux, uy, uz = {call}\n"
+            body += "    k += rate\n    bx += rate * ux\n    by += rate * uy\n    bz += rate * uz\n"
+        self.text.add(
+            f"@inline\ndef pushed{head}{body}    return ax, ay, az, k, bx, by, bz\n"
+        )
+
+    def _slopes(self, i: int, state: tuple[str, ...], share: float) -> str:
+        """Source for the slopes k of stage i at a state."""
+        call = f"({', '.join(state)}, age + F({share!r}) * h, C, S{i}, L, t{i})"
+        x, y, z, vx, vy, vz = state
+        lines = f"    ux{i}, uy{i}, uz{i} = carried{call}\n" if self.flows else ""
+        if not self.motion.inertial:
+            return lines
+        for axis, v in zip(AXES, (vx, vy, vz), strict=True):
+            flow = f" + u{axis}{i}" if self.flows else ""
+            lines += f"    k{axis}{i} = {v}{flow}\n"
+        lines += f"    ax{i}, ay{i}, az{i}, r, bx, by, bz = pushed{call}\n"
+        for axis, v in zip(AXES, (vx, vy, vz), strict=True):
+            lines += f"    a{axis}{i} += b{axis} - r * {v}\n"
+        return lines
+
+    def explicit(self, method: Explicit) -> None:
+        """`advance` from a Butcher tableau."""
+        lines = ""
+        slope = "k" if self.motion.inertial else "u"
+        for i, row in enumerate(method.a):
+            state = []
+            for axis in AXES:
+                state.append(_combine(axis, row, slope, axis))
+            for axis in AXES:
+                moved = row if self.motion.inertial else ()
+                state.append(_combine(f"v{axis}", moved, "a", axis))
+            names = tuple(f"{n}_{i}" for n in STATE)
+            lines += "".join(f"    {n} = {e}\n" for n, e in zip(names, state, strict=True))
+            lines += self._slopes(i, names, method.c[i])
+        ends = [_combine(axis, method.b, slope, axis) for axis in AXES]
+        if self.motion.inertial:
+            ends += [_combine(f"v{axis}", method.b, "a", axis) for axis in AXES]
+        else:
+            ends += ["vx", "vy", "vz"]
+        self._advance(method, lines, ends)
+
+    def splitting(self, method: Splitting) -> None:
+        """`advance` as kicks and drifts; relaxations are exact, so that no step explodes."""
+        places = stage_times(method)
+        lines = ""
+        for kick, drift, begin in zip(
+            method.kicks, (*method.drifts, 0.0), method.times, strict=True
+        ):
+            if kick and self.motion.inertial:
+                i = places.index(begin)
+                lines += self._kick(kick, i, begin)
+            if drift:
+                lines += self._drift(drift, begin, places)
+        self._advance(method, lines, list(STATE))
+
+    def _kick(self, share: float, i: int, begin: float) -> str:
+        call = f"({', '.join(STATE)}, age + F({begin!r}) * h, C, S{i}, L, t{i})"
+        lines = f"    ax, ay, az, r, bx, by, bz = pushed{call}\n"
+        lines += f"    g = F({share!r}) * h\n"
+        if any(c.kernel("relaxation") for c, _ in self.forces):
+            lines += "    g *= phi1(r * g)\n"
+        return lines + "".join(
+            f"    v{axis} += g * (a{axis} + b{axis} - r * v{axis})\n" for axis in AXES
+        )
+
+    def _drift(self, share: float, begin: float, places: tuple[float, ...]) -> str:
+        lines = f"    d = F({share!r}) * h\n"
+        if not self.flows:
+            return lines + "".join(f"    {axis} += d * v{axis}\n" for axis in AXES)
+        first, middle = places.index(begin), places.index(begin + share / 2)
+        age = f"age + F({begin!r}) * h"
+        own = {axis: f"v{axis} + " if self.motion.inertial else "" for axis in AXES}
+        lines += f"    ux, uy, uz = carried({', '.join(STATE)}, {age}, C, S{first}, L, t{first})\n"
+        lines += "".join(
+            f"    m{a} = {a} + F(0.5) * d * ({own[a]}u{a})\n" for a in AXES
+        )
+        lines += f"    ux, uy, uz = carried(mx, my, mz, vx, vy, vz, {age} + F(0.5) * d, "
+        lines += f"C, S{middle}, L, t{middle})\n"
+        return lines + "".join(f"    {a} += d * ({own[a]}u{a})\n" for a in AXES)
+
+    def _advance(self, method: Method, lines: str, ends: list[str]) -> None:
+        stages = range(len(stage_times(method)))
+        scene = ", ".join(f"S{i}" for i in stages)
+        times = ", ".join(f"t{i}" for i in stages)
+        self.text.add(
+            f"@inline\ndef advance({', '.join(STATE)}, age, C, {scene}, L, {times}, h):\n"
+            f"{lines}    return {', '.join(ends)}\n"
+        )
+
+    def dies(self) -> None:
+        """`dies`: whether any retirement applies."""
+        calls = [
+            f"{self.text.kernel(type(c), 'dies')}({p}, {self.particle}, t)"
+            for c, p in self.retire
+        ]
+        self.text.add(
+            f"@inline\ndef dies({', '.join(STATE)}, age, C, S, L, t):\n{self._preamble()}"
+            f"    return {' | '.join(f'({c})' for c in calls)}\n"
+        )
+
+
+
+
+def _combine(start: str, weights: tuple[float, ...], slope: str, axis: str) -> str:
+    """`start + h * (w_0 slope_0 + w_1 slope_1 ...)` without the zero terms."""
+    terms = [
+        f"F({float(w)!r}) * {slope}{axis}{j}" for j, w in enumerate(weights) if w != 0
+    ]
+    return f"{start} + h * ({' + '.join(terms)})" if terms else start
+
+

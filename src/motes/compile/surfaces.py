@@ -1,0 +1,112 @@
+"""The solids of a scene as functions of a point: `solids` (poses at a time), `near` (distance).
+
+`solids(S)` gives one flat tuple D. Solid k begins at START[k]: position (3), rotation matrix by rows
+(9), restitution, friction, then its own parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from motes.catalog import Component
+from motes.compile.text import Text
+from motes.control.constant import Constant
+
+POSE = 12
+HEAD = POSE + 2
+"""Numbers before a solid's own parameters."""
+
+
+CARRIED = """@inline
+def moved(D0, D1, k, x, y, z):
+    x -= D0[k]
+    y -= D0[k + 1]
+    z -= D0[k + 2]
+    a = D0[k + 3] * x + D0[k + 6] * y + D0[k + 9] * z
+    b = D0[k + 4] * x + D0[k + 7] * y + D0[k + 10] * z
+    c = D0[k + 5] * x + D0[k + 8] * y + D0[k + 11] * z
+    return (
+        D1[k] + D1[k + 3] * a + D1[k + 4] * b + D1[k + 5] * c,
+        D1[k + 1] + D1[k + 6] * a + D1[k + 7] * b + D1[k + 8] * c,
+        D1[k + 2] + D1[k + 9] * a + D1[k + 10] * b + D1[k + 11] * c,
+    )
+
+
+@inline
+def carried_by(D0, D1, k, x, y, z):
+    a, b, c = moved(D0, D1, k, x, y, z)
+    return sqrt((a - x) * (a - x) + (b - y) * (b - y) + (c - z) * (c - z))
+"""
+"""Where a point fixed to the solid that begins at entry k gets between two poses, and how far."""
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Solids with their addresses, and where each begins in D."""
+
+    solids: tuple[tuple[str, Component], ...]
+    starts: tuple[int, ...]
+
+    @property
+    def moving(self) -> bool:
+        """Whether any solid moves or changes over time."""
+        return any(
+            not isinstance(control, Constant)
+            for _, solid in self.solids
+            for key, control in solid.values.items()
+            if control.scope != "fixed" and key != "color"
+        )
+
+
+def write_surfaces(text: Text, solids: Sequence[tuple[str, Component]]) -> Surfaces:
+    """Write `solids(S)` and `near(D, x, y, z)` into the text."""
+    lines, entries, starts, distances = "", [], [], []
+    for k, (address, solid) in enumerate(solids):
+        add = lambda key, a=address, s=solid: text.values.add(s.values[key], f"{a}.{key}")  # noqa: E731
+        starts.append(len(entries))
+        position, rotation = add("position"), add("rotation")
+        for axis, angle in zip("xyz", rotation, strict=True):
+            lines += f"    {axis} = {angle} * F(0.017453292519943295)\n"
+            lines += f"    c{axis}, s{axis} = cos({axis}), sin({axis})\n"
+        matrix = {
+            "a": "cy * cz", "b": "sx * sy * cz - cx * sz", "c": "cx * sy * cz + sx * sz",
+            "d": "cy * sz", "e": "sx * sy * sz + cx * cz", "f": "cx * sy * sz - sx * cz",
+            "g": "-sy", "h": "sx * cy", "i": "cx * cy",
+        }  # fmt: skip
+        lines += "".join(f"    {name}{k} = {value}\n" for name, value in matrix.items())
+        entries += [*position, *(f"{name}{k}" for name in matrix)]
+        entries += [*add("restitution"), *add("friction")]
+        fields = {}
+        for key in solid.parameters:
+            if key in solid.own:
+                start, width = len(entries), len(expressions := add(key))
+                entries += expressions
+                parts = [f"D[{start + i}]" for i in range(width)]
+                fields[key] = parts[0] if width == 1 else f"({', '.join(parts)})"
+        record = text.record("P", fields or {"nothing": "F(0.0)"})
+        distances.append(_distance(text, solid, record, k, starts[-1]))
+    text.add(f"@inline\ndef solids(S):\n{lines}    return ({', '.join(entries)},)\n")
+    body = "    best, which = solid_0(D, x, y, z), 0\n"
+    for k in range(1, len(solids)):
+        body += f"    d = solid_{k}(D, x, y, z)\n"
+        body += f"    which = {k} if d < best else which\n    best = min(best, d)\n"
+    for source in distances:
+        text.add(source)
+    text.add(f"@inline\ndef near(D, x, y, z):\n{body}    return best, which\n")
+    text.add(CARRIED)
+    return Surfaces(tuple(solids), tuple(starts))
+
+
+def _distance(text: Text, solid: Component, record: str, k: int, start: int) -> str:
+    """Source of one solid's distance from a point of the scene."""
+    rows = "".join(f"    {a} -= D[{start + i}]\n" for i, a in enumerate("xyz"))
+    local = [
+        " + ".join(f"D[{start + 3 + 3 * row + column}] * {axis}" for row, axis in enumerate("xyz"))
+        for column in range(3)
+    ]
+    name = text.kernel(type(solid), "distance")
+    return (
+        f"@inline\ndef solid_{k}(D, x, y, z):\n{rows}"
+        f"    return {name}({record}, {', '.join(local)})\n"
+    )

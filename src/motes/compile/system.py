@@ -1,0 +1,131 @@
+"""One system, compiled: its arrays of numbers and its kernels.
+
+Two modules are generated for a system, one in the scene's precision for the SIMD loops and one in
+double precision for rows that need care (newborns and impacts), and one for each emitter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.catalog import Component
+from motes.compile.births import Channels, births_kernel, write_draws, write_emitter
+from motes.compile.impacts import currents_kernel, exceptions_kernel, write_flight
+from motes.compile.motion import KEPT, Motion, write_motion
+from motes.compile.straight import write_straight
+from motes.compile.surfaces import Surfaces, write_surfaces
+from motes.compile.text import Text
+from motes.compile.values import Column
+from motes.state import Particles
+
+Addressed = Sequence[tuple[str, Component]]
+
+
+@dataclass(frozen=True)
+class CompiledEmitter:
+    """An emitter's kernel and what it reads."""
+
+    kernel: Any
+    K: tuple[Any, ...]
+    channels: np.ndarray[Any, Any]
+
+
+class CompiledSystem:
+    """Everything that steps one system; machine code is made (or loaded) at the first call."""
+
+    def __init__(
+        self, motion: Motion, solids: Addressed, emitters: Addressed, precision: str, strict: bool
+    ) -> None:
+        self.motion = motion
+        hard = [(a, s) for a, s in solids if s.values["collides"].document()]
+        self.fast, self.surfaces = self._text(hard, precision, strict)
+        write_straight(self.fast, motion, self.surfaces)
+        self.fast.add(self.fast.values.scene_text())
+        self.exact, _ = self._text(hard, "double", strict)
+        write_flight(self.exact, motion)
+        self.exact.add(self.exact.values.scene_text())
+        self.columns = self._columns()
+        self._emitters, self._strict = emitters, strict
+        self.K = self.fast.values.arrays(self.fast.real)
+        self.K_exact = self.exact.values.arrays(np.float64)
+
+    def _text(self, solids: Addressed, precision: str, strict: bool) -> tuple[Text, Any]:
+        text = Text(precision, strict)
+        write_motion(text, self.motion)
+        surfaces = write_surfaces(text, solids) if solids else None
+        return text, surfaces
+
+    def _columns(self) -> list[Column]:
+        """Columns of the kernels first, then traits that only drawing reads."""
+        columns = list(self.fast.values.columns)
+        known = {c.address for c in columns}
+        for name, (address, control) in self.motion.traits.items():
+            drawn = control.scope == "birth" or (name in KEPT and hasattr(control, "spline"))
+            if drawn and address not in known:
+                columns.append(Column(address, control, name))
+        return columns
+
+    @cached_property
+    def _fast_module(self) -> dict[str, Any]:
+        return self.fast.module()
+
+    @property
+    def straight(self) -> Any:
+        """Kernel: a step of every row in a range; rows that might meet a solid are only flagged."""
+        return self._fast_module["straight"]
+
+    @property
+    def retire(self) -> Any:
+        """Kernel: flags the rows that die."""
+        return self._fast_module["retire"]
+
+    @cached_property
+    def _exact_module(self) -> dict[str, Any]:
+        return self.exact.module()
+
+    @cached_property
+    def exceptions(self) -> Any:
+        """Kernel: given rows through the step, from their birth, through impacts."""
+        return exceptions_kernel(self._exact_module, self.motion, self.surfaces)
+
+    def carried(self, particles: Particles, time: float) -> NDArray[np.float64]:
+        """Velocity (n, 3) [m/s] that the flows give to particles that have none of their own."""
+        result = np.empty((particles.count, 3))
+        currents = currents_kernel(self._exact_module)
+        currents(particles.position, particles.birth, particles.columns, self.K_exact, time, result)
+        return result
+
+    @cached_property
+    def emitters(self) -> dict[str, CompiledEmitter]:
+        """Kernels and numbers of the emitters, by address."""
+        traits = Text("double", self._strict)
+        self._trait_channels = Channels()
+        write_draws(traits, self.columns, self._trait_channels)
+        traits.add(traits.values.scene_text())
+        self.K_traits = traits.values.arrays(np.float64)
+        from motes.compile.births import normals, uniforms
+
+        extra = {"uniforms": uniforms, "normals": normals}
+        trait_module = traits.module(extra)
+        width = sum(c.width for c in self.columns)
+        result = {}
+        for address, emitter in self._emitters:
+            text, channels = Text("double", self._strict), Channels()
+            write_emitter(text, emitter, address, channels)
+            text.add(text.values.scene_text())
+            kernel = births_kernel(text.module(extra), trait_module, width, self.motion.inertial)
+            result[address] = CompiledEmitter(
+                kernel, text.values.arrays(np.float64), channels.array()
+            )
+        return result
+
+    @property
+    def trait_channels(self) -> Any:
+        """Channels of the system's columns."""
+        return self._trait_channels.array()

@@ -1,0 +1,139 @@
+"""The generated text of a system: its components fused into functions of one particle.
+
+What the text defines, in this order: elementary functions and kernels; `scene` (values at a time);
+`rate` or `kick` and `drift` (the right-hand side); `advance` (one step of one particle, written out
+from the method's table); `straight` (the SIMD loop). Loops that are not hot live in plain Python
+files beside this one and call these functions.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import linecache
+from collections import namedtuple
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from motes.catalog import Component
+from motes.compile.values import Values
+from motes.control.curve import TABLE_SIZE
+from motes.jit import FAST, STRICT, cache_folder, jit, written_whole
+from motes.kernel import ELEMENTARY
+from motes.language import Translation
+
+AXES = ("x", "y", "z")
+STATE = ("x", "y", "z", "vx", "vy", "vz")
+
+
+@dataclass
+class Text:
+    """Collects the source of one generated module and turns it into functions."""
+
+    precision: str
+    strict: bool = False
+    values: Values = field(default_factory=Values)
+    translation: Translation = field(default_factory=Translation)
+    records: dict[str, Any] = field(default_factory=dict)
+    parts: list[str] = field(default_factory=list)
+
+    @property
+    def real(self) -> Any:
+        """The floating-point type of the module."""
+        return np.float32 if self.precision == "single" else np.float64
+
+    def kernel(self, component: type[Component], name: str) -> str:
+        """Translate a component's kernel; returns the name of its function."""
+        function = component.kernel(name)
+        assert function is not None
+        return self.translation.add(function, f'{component.kind.noun} "{component.type}"')
+
+    def record(self, name: str, fields: dict[str, str]) -> str:
+        """An expression that builds a named tuple with the given expressions as fields."""
+        names = tuple(fields)
+        kind = f"{name}_{hashlib.sha1(','.join(names).encode()).hexdigest()[:6]}"
+        self.records[kind] = namedtuple(kind, names)  # type: ignore[misc]
+        return f"{kind}({', '.join(fields.values())})"
+
+    def parameters(self, component: Component, address: str, only: Sequence[str] = ()) -> str:
+        """An expression for a component's `p`: its own parameters by name."""
+        fields = {
+            key: packed(self.values.add(component.values[key], f"{address}.{key}"))
+            for key in (only or [k for k in component.parameters if k in component.own])
+        }
+        return self.record("P", fields or {"nothing": "F(0.0)"})
+
+    def add(self, source: str) -> None:
+        """Append a function's source."""
+        self.parts.append(source)
+
+    def module(self, extra: dict[str, Any] | None = None) -> dict[str, Any]:
+        """Compile the collected text lazily: its functions by name.
+
+        Kernels that do not depend on a change keep their machine code: the kernel cache names each
+        by its own text and that of the functions it calls.
+        """
+        source = "\n\n".join([*self.translation.text, *self.parts])
+        flags = STRICT if self.strict else FAST
+        scope: dict[str, Any] = {
+            "__name__": __name__,  # Cached machine code is rebuilt in an importable module.
+            "F": self.real,
+            "inline": lambda f: jit(f, flags=flags, inline=True),
+            "kernel": lambda f: jit(f, flags=flags),
+            "lookup": _lookup(self.real, flags),
+            **self.translation.types,
+            **self.records,
+            **(extra or {}),
+        }
+        exact = STRICT if self.strict else None
+        for name, function in self.translation.elementary.items():
+            scope[name] = function.compiled(self.precision, exact)
+        for name in ("phi1", "sqrt", "sin", "cos"):
+            scope[name] = ELEMENTARY[name].compiled(self.precision, exact)
+        if self.values.splines:
+            from motes.control.spline_kernels import spline_at
+
+            scope["spline_at"] = spline_at
+        file = _keep(source)
+        exec(compile(source, file, "exec"), scope)
+        return scope
+
+
+def packed(expressions: Sequence[str]) -> str:
+    """One expression, or a tuple of several."""
+    return expressions[0] if len(expressions) == 1 else f"({', '.join(expressions)})"
+
+
+def _keep(source: str) -> str:
+    """Write the text beside the kernels, so that debuggers and tracebacks can show it."""
+    name = hashlib.sha256(source.encode()).hexdigest()[:24]
+    path = cache_folder() / "modules" / f"{name}.py"
+    try:
+        if not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+            with written_whole(path) as file:
+                file.write(source.encode())
+    except OSError:
+        pass  # Only a convenience: the text also stands in linecache.
+    linecache.cache[str(path)] = (len(source), None, source.splitlines(True), str(path))
+    return str(path)
+
+
+@cache
+def _lookup(real: Any, flags: frozenset[str]) -> Any:
+    """Linear interpolation in a row of the lookup tables; `place` runs from 0 to 1."""
+    zero, one, last = real(0), real(1), real(TABLE_SIZE - 1)
+    top = np.int32(TABLE_SIZE - 2)
+
+    def lookup(tables, row, place):  # type: ignore[no-untyped-def]
+        u = min(max(place, zero), one) * last
+        left = min(np.int32(u), top)
+        weight = u - real(left)
+        index = np.uint32(left)  # Unsigned: a signed index would be tested for a negative value.
+        low, high = tables[row, index], tables[row, index + np.uint32(1)]
+        return low + weight * (high - low)
+
+    return jit(lookup, flags=flags, inline=True)

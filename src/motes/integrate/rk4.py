@@ -1,0 +1,10 @@
+"""The classical Runge-Kutta method: fourth order with four evaluations. The default."""
+
+from motes.tableau import Explicit
+
+method = Explicit(
+    order=4,
+    c=(0, 1 / 2, 1 / 2, 1),
+    a=((), (1 / 2,), (0, 1 / 2), (0, 0, 1)),
+    b=(1 / 6, 1 / 3, 1 / 3, 1 / 6),
+)

@@ -1,0 +1,5 @@
+"""Semi-implicit (symplectic) Euler: kick, then drift. Cheap, and stable for drag and springs."""
+
+from motes.tableau import Splitting
+
+method = Splitting(order=1, kicks=(1, 0), drifts=(1,))

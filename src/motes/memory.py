@@ -1,0 +1,46 @@
+"""The one place where large arrays come from: it checks a memory budget before it allocates."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from motes.errors import MemoryBudgetError
+
+SHARE = 0.8
+"""Share of the memory available at the first use that is the budget, unless MOTES_MEMORY says."""
+
+_budget: int | None = None
+
+
+def budget() -> int:
+    """Bytes that one array may have: MOTES_MEMORY (in MiB), or 80 % of what is available."""
+    global _budget
+    if _budget is None:
+        import psutil
+
+        chosen = os.environ.get("MOTES_MEMORY", "")
+        available = int(psutil.virtual_memory().available * SHARE)
+        _budget = int(float(chosen) * 2**20) if chosen.replace(".", "", 1).isdigit() else available
+    return _budget
+
+
+def allocate(shape: tuple[int, ...], dtype: DTypeLike, what: str) -> NDArray[Any]:
+    """An array of zeros. Raises MemoryBudgetError, with nothing allocated, when it is too large."""
+    size = int(np.prod(shape, dtype=object)) * np.dtype(dtype).itemsize
+    if size > budget():
+        raise MemoryBudgetError(
+            f"{what} would need {_shown(size)}, more than the budget of {_shown(budget())}. "
+            "Emit fewer particles, shorten their life, set a capacity, or raise MOTES_MEMORY [MiB]."
+        )
+    try:
+        return np.zeros(shape, dtype)
+    except MemoryError:
+        raise MemoryBudgetError(f"{what} would need {_shown(size)}; the system has no more.") from None
+
+
+def _shown(size: int) -> str:
+    return f"{size / 2**30:.1f} GiB" if size >= 2**30 else f"{size / 2**20:.0f} MiB"

@@ -1,0 +1,237 @@
+"""A simulation: a scene, compiled, with its state; it steps, it gives frames."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.appearance import Look
+from motes.catalog import Component, find
+from motes.compile.motion import Motion
+from motes.compile.system import CompiledSystem
+from motes.diagnose import explain_infinity
+from motes.emission import Clock
+from motes.errors import SceneError, SimulationError, likely
+from motes.frame import Frame
+from motes.integrate import method
+from motes.scene.address import component_address
+from motes.scene.document import Scene, System
+from motes.state import Particles, State
+from motes.step import Interval, Stepper
+from motes.view import View
+
+EDGE = 1e-6
+"""A time this close to a step's end, in steps, counts as the step's end."""
+
+
+class Simulation:
+    """A scene that runs.
+
+    The time is step * number of steps, exactly; a frame between two steps is a throwaway partial
+    step, so that it changes nothing.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.start = -scene.prewarm
+        self._steppers = {s.name: self._stepper(s) for s in scene.systems}
+        self._looks = {s.name: Look(s) for s in scene.systems}
+        self._systems = {s.name: s for s in scene.systems}
+        real = np.float32 if scene.precision == "single" else np.float64
+        self._state = State(0, {})
+        for system in scene.systems:
+            compiled = self._steppers[system.name].system
+            widths = [(c.address, c.width) for c in compiled.columns]
+            moves = compiled.motion.inertial
+            self._state.systems[system.name] = Particles(system.name, real, moves, widths)
+        self.work = 0
+        """Particle-steps taken so far."""
+        self._lead_in = round(scene.prewarm / scene.step)
+        self.start = -self._lead_in * scene.step
+        self._run(self._lead_in, None)
+
+    def _stepper(self, system: System) -> Stepper:
+        scene = self.scene
+
+        def addressed(*lists: Any) -> tuple[tuple[str, Component], ...]:
+            found = [
+                (component_address(owner, c), c)
+                for owner, components in zip((None, system), lists, strict=True)
+                for c in components
+            ]
+            return tuple(sorted(found, key=lambda pair: pair[0]))  # Sums run in order of names.
+
+        traits = {
+            name: (f"{system.name}.{name}", control)
+            for name in ("life", "mass", "size", "color")
+            if (control := getattr(system, name)) is not None
+        }
+        retire = list(system.retire)
+        if system.life is not None and not any(r.type == "lifetime" for r in retire):
+            retire.append(find("retire", "lifetime")(name="lifetime"))
+        motion = Motion(
+            addressed(scene.force, system.force),
+            addressed(scene.flow, system.flow),
+            tuple((component_address(system, r), r) for r in retire),
+            traits,
+            method(system.integrator or scene.integrator),
+        )
+        emitters = addressed((), system.emit)
+        compiled = CompiledSystem(
+            motion, addressed(scene.solid, ()), emitters, scene.precision, scene.mode == "strict"
+        )
+        clocks = [Clock(address, emitter, self.start) for address, emitter in emitters]
+        return Stepper(compiled, clocks, scene.seed, system.capacity)
+
+    @property
+    def steps(self) -> int:
+        """Steps taken since time 0."""
+        return self._state.number - self._lead_in
+
+    @property
+    def time(self) -> float:
+        """Scene time [s]: the number of steps times their length."""
+        return self.steps * self.scene.step
+
+    @property
+    def count(self) -> int:
+        """Particles alive, all systems together."""
+        return sum(p.count for p in self._state.systems.values())
+
+    @property
+    def impacts(self) -> int:
+        """Impacts on solids so far."""
+        return sum(s.impacts for s in self._steppers.values())
+
+    def __getitem__(self, name: str) -> View:
+        if name not in self._systems:
+            menu = ", ".join(self._systems)
+            raise SceneError(f'no system "{name}".{likely(name, self._systems)} There are: {menu}.')
+        return View(
+            self._state.systems[name],
+            self._steppers[name].system,
+            self._looks[name],
+            self.time,
+        )
+
+    def digest(self) -> str:
+        """One hash of the whole state: equal digests mean equal bits."""
+        return self._state.digest()
+
+    def step(self) -> None:
+        """Take one step."""
+        self.run(steps=1)
+
+    def run(
+        self,
+        *,
+        until: float | None = None,
+        steps: int | None = None,
+        progress: Callable[[Simulation], None] | None = None,
+    ) -> None:
+        """Run for a number of steps, or to the last step that does not go beyond a time [s].
+
+        `progress` is called after every step. Raises SimulationError when a particle became
+        infinite, with the likely cause.
+        """
+        if (until is None) == (steps is None):
+            raise ValueError("run takes either steps or until, such as run(until=2.0)")
+        if until is not None:
+            if not math.isfinite(until):
+                raise ValueError(f"until must be finite, not {until}")
+            steps = max(self._steps_before(until) - self.steps, 0)
+        assert steps is not None
+        if steps < 0:
+            raise ValueError(f"steps must be at least 0, not {steps}")
+        self._run(steps, progress)
+        self.check()
+
+    def _run(self, steps: int, progress: Callable[[Simulation], None] | None) -> None:
+        for _ in range(steps):
+            begin = (self._state.number - self._lead_in) * self.scene.step
+            self._advance(self._state, begin, self.scene.step)
+            self._state.number += 1
+            if progress is not None:
+                progress(self)
+
+    def _advance(self, state: State, begin: float, length: float) -> None:
+        for name in sorted(state.systems):
+            self.work += state.systems[name].count
+            self._steppers[name].step(state.systems[name], Interval(begin, length))
+
+    def _steps_before(self, time: float) -> int:
+        return math.floor(time / self.scene.step + EDGE)
+
+    def frame(self, time: float | None = None, index: int = 0) -> Frame:
+        """What is to be seen at a time [s], by default now; the simulation stays where it is."""
+        state, at = self._state, self.time
+        if time is not None:
+            ahead = time - self.time
+            if ahead < -EDGE * self.scene.step:
+                raise ValueError(f"time {time} s lies before the simulation's, {self.time} s")
+            if ahead > EDGE * self.scene.step:
+                state, at = self._glimpse(time)
+        systems = {}
+        for name, particles in state.systems.items():
+            view = View(particles, self._steppers[name].system, self._looks[name], at)
+            systems[name] = view.drawn()
+        return Frame(time=at if time is None else time, index=index, systems=systems)
+
+    def _glimpse(self, time: float) -> tuple[State, float]:
+        """A copy of the state, taken to a time beyond it by steps and a partial one."""
+        state = self._state.copy()
+        impacts = {name: s.impacts for name, s in self._steppers.items()}
+        while True:
+            begin = (state.number - self._lead_in) * self.scene.step
+            length = min(self.scene.step, time - begin)
+            if length <= EDGE * self.scene.step:
+                break
+            self._advance(state, begin, length)
+            state.number += 1
+            if length < self.scene.step:
+                break
+        for name, stepper in self._steppers.items():
+            stepper.impacts = impacts[name]
+        return state, time
+
+    def frames(self, first: int = 1, last: int | None = None) -> Iterator[Frame]:
+        """Frames of the film, from 1 at time 0, every 1/fps seconds, up to the duration."""
+        fps = float(self.scene.film.fps)
+        if last is None:
+            last = self.frame_count
+        for index in range(first, last + 1):
+            time = (index - 1) / fps
+            self._run(max(self._steps_before(time) - self.steps, 0), None)
+            self.check()
+            yield self.frame(time, index)
+
+    @property
+    def frame_count(self) -> int:
+        """Frames of the whole film."""
+        return max(1, math.floor(self.scene.duration * float(self.scene.film.fps) + EDGE))
+
+    def check(self) -> None:
+        """Raise SimulationError when a particle became infinite or not a number."""
+        for name, particles in self._state.systems.items():
+            row = _first_not_finite(particles)
+            if row is not None:
+                raise SimulationError(
+                    explain_infinity(particles, row, self._steppers[name].system, self.time)
+                )
+
+
+def _first_not_finite(particles: Particles) -> int | None:
+    parts: list[NDArray[Any]] = [particles.position[:, : particles.count]]
+    if particles.moves:
+        parts.append(particles.velocity[:, : particles.count])
+    for block in parts:
+        # A sum is infinite or NaN when an element is, and needs no temporary array.
+        if not np.isfinite(block.sum(dtype=np.float64)):
+            bad = ~np.isfinite(block).all(axis=0)
+            if bad.any():
+                return int(np.argmax(bad))
+    return None

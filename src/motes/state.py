@@ -1,0 +1,128 @@
+"""The state: everything that can change the next bit of a simulation, and nothing else.
+
+Columns are arrays of one number a particle, positions and velocities one (3, capacity) block each.
+Rows move only in `Particles.keep`. Births need no memory: the k-th birth of an emitter is a
+function of time.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.jit import jit, share
+from motes.memory import allocate
+
+SMALLEST = 1024
+"""Rows that a system starts with."""
+
+
+@dataclass
+class Particles:
+    """The particles of one system: rows 0 to count - 1 of every array are alive."""
+
+    name: str
+    real: Any
+    moves: bool
+    """Whether particles have a velocity of their own."""
+    widths: Sequence[tuple[str, int]]
+    """Addresses and widths of the columns drawn at birth."""
+    count: int = 0
+    position: NDArray[Any] = field(init=False)
+    velocity: NDArray[Any] = field(init=False)
+    birth: NDArray[np.float64] = field(init=False)
+    """Scene time of birth [s]."""
+    ids: NDArray[np.uint64] = field(init=False)
+    columns: tuple[NDArray[Any], ...] = field(init=False)
+    """Values drawn at birth, one array a component, in the order of `widths`."""
+
+    def __post_init__(self) -> None:
+        self._allocate(SMALLEST)
+
+    @property
+    def capacity(self) -> int:
+        """Rows that fit before the arrays must grow."""
+        return self.position.shape[1]
+
+    def _allocate(self, rows: int) -> None:
+        what = f'system "{self.name}" with {rows} rows'
+        self.position = allocate((3, rows), self.real, what)
+        self.velocity = allocate((3, rows if self.moves else 0), self.real, what)
+        self.birth = allocate((rows,), np.float64, what)
+        self.ids = allocate((rows,), np.uint64, what)
+        width = sum(w for _, w in self.widths)
+        self.columns = tuple(allocate((rows,), self.real, what) for _ in range(max(width, 1)))
+
+    def arrays(self) -> list[NDArray[Any]]:
+        """All columns as rows of numbers, in a fixed order."""
+        drawn = self.columns if self.widths else ()
+        velocity = list(self.velocity) if self.moves else []
+        return [*self.position, *velocity, self.birth, self.ids, *drawn]
+
+    def reserve(self, more: int) -> None:
+        """Make room for more rows; capacity doubles, and what is alive is copied."""
+        if self.count + more <= self.capacity:
+            return
+        rows = self.capacity
+        while rows < self.count + more:
+            rows *= 2
+        old = self.arrays()
+        self._allocate(rows)
+        for before, after in zip(old, self.arrays(), strict=True):
+            after[: self.count] = before[: self.count]
+
+    def keep(self, dead: NDArray[np.uint8]) -> int:
+        """Close the gaps of the rows marked dead, in order; returns how many went."""
+        first = int(np.argmax(dead[: self.count])) if self.count else 0
+        if self.count == 0 or not dead[first]:
+            return 0
+        arrays = self.arrays()
+        share(lambda k: _compact(arrays[k], dead, first, self.count), len(arrays))
+        gone = int(np.count_nonzero(dead[: self.count]))
+        self.count -= gone
+        return gone
+
+    def copy(self) -> Particles:
+        """An independent copy of the rows that are alive, with room for births."""
+        twin = object.__new__(Particles)
+        twin.__dict__.update(self.__dict__)
+        twin._allocate(max(SMALLEST, self.count + self.count // 8))
+        for mine, theirs in zip(self.arrays(), twin.arrays(), strict=True):
+            theirs[: self.count] = mine[: self.count]
+        return twin
+
+
+@dataclass
+class State:
+    """Step number and particles; the time is start + step * number, never a sum."""
+
+    number: int
+    systems: dict[str, Particles]
+
+    def copy(self) -> State:
+        """An independent copy."""
+        return State(self.number, {name: p.copy() for name, p in self.systems.items()})
+
+    def digest(self) -> str:
+        """One hash of the whole state, of 32 hexadecimal digits."""
+        total = hashlib.blake2b(str(self.number).encode(), digest_size=16)
+        for name, particles in sorted(self.systems.items()):
+            total.update(f"{name} {particles.count} {particles.widths}".encode())
+            for array in particles.arrays():
+                total.update(np.ascontiguousarray(array[: particles.count]).data)
+        return total.hexdigest()
+
+
+@jit
+def _compact(array, dead, first, count):  # type: ignore[no-untyped-def]
+    """Move the rows that live down over those that died, in order."""
+    free = first
+    for i in range(first, count):
+        if dead[i] == 0:
+            array[free] = array[i]
+            free += 1

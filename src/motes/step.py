@@ -1,0 +1,166 @@
+"""One time step. This is the page to read first.
+
+A step takes the state from t to t + h in phases: births at their own instants, integration of the
+rows that were alive, exceptions (newborns, and rows that may meet a solid), events, deaths. Every
+particle feels the forces at the exact times of the method's stages; none is advanced before
+another that it could feel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.compile.system import CompiledSystem
+from motes.emission import Clock
+from motes.jit import blocks, share
+from motes.state import Particles
+
+LARGEST_BLOCK = 1 << 18
+"""Rows of one kernel call: a few milliseconds, so that Ctrl-C works."""
+
+SMALLEST_BLOCK = 1 << 14
+"""Rows below which a second thread costs more than it brings."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """The step that is being taken: from `begin`, `length` seconds long."""
+
+    begin: float
+    length: float
+
+    @property
+    def end(self) -> float:
+        """Time at the end of the step."""
+        return self.begin + self.length
+
+
+class Stepper:
+    """Steps one system: its compiled kernels, its emitters' clocks, its room for flags."""
+
+    def __init__(
+        self, system: CompiledSystem, clocks: list[Clock], seed: int, capacity: int | None
+    ) -> None:
+        self.system, self.clocks, self.capacity = system, clocks, capacity
+        self.seed = np.uint64(seed)
+        self.flags: NDArray[np.uint8] = np.zeros(0, np.uint8)
+        self.impacts = 0
+
+    def step(self, rows: Particles, interval: Interval) -> None:
+        """Take the system through one step, in place."""
+        alive = rows.count
+        self.births(rows, interval)
+        threatened = self.integrate(rows, alive, interval)
+        self.exceptions(rows, threatened, alive, interval)
+        self.events()
+        self.deaths(rows, interval)
+
+    def births(self, rows: Particles, interval: Interval) -> None:
+        """Append the newborns of the step, as they are at their own instants."""
+        for clock in self.clocks:
+            for source in clock.sources(interval.begin, interval.end):
+                count = len(source.times)
+                if self.capacity is not None:
+                    count = min(count, self.capacity - rows.count)
+                if count <= 0:
+                    continue
+                rows.reserve(count)
+                self._write(rows, clock.name, source.address, source.numbers, source.times, count)
+                rows.count += count
+
+    def _write(
+        self,
+        rows: Particles,
+        name: str,
+        address: int,
+        numbers: NDArray[np.uint64],
+        times: NDArray[np.float64],
+        count: int,
+    ) -> None:
+        emitter = self.system.emitters[name]
+        channels, first = self.system.trait_channels, rows.count
+        parts = _parts(count, 64)
+
+        def write(k: int) -> None:
+            low, high = parts[k]
+            emitter.kernel(
+                rows.position, rows.velocity, rows.birth, rows.ids, rows.columns, first + low,
+                times[low:high], numbers[low:high], np.uint64(address), self.seed, emitter.K,
+                emitter.channels, self.system.K_traits, channels,
+            )  # fmt: skip
+
+        share(write, len(parts))
+
+    def integrate(self, rows: Particles, alive: int, interval: Interval) -> NDArray[np.int64]:
+        """Take the rows that were alive through the step; returns those that may meet a solid."""
+        flags = self._flags(rows)
+        parts = _parts(alive, 1)
+
+        def straight(k: int) -> None:
+            low, high = parts[k]
+            self.system.straight(
+                rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
+                interval.begin, interval.length, low, high,
+            )  # fmt: skip
+
+        share(straight, len(parts))
+        if self.system.surfaces is None:
+            return np.zeros(0, np.int64)
+        return np.flatnonzero(flags[:alive])
+
+    def exceptions(
+        self, rows: Particles, threatened: NDArray[np.int64], alive: int, interval: Interval
+    ) -> None:
+        """Take newborns from their birth, and threatened rows through impacts, to the step's end."""
+        newborn = np.arange(alive, rows.count, dtype=np.int64)
+        exceptional = np.concatenate([threatened, newborn])
+        parts = _parts(exceptional.size, 64)
+        impacts = [0] * len(parts)
+
+        def care(k: int) -> None:
+            low, high = parts[k]
+            impacts[k] = self.system.exceptions(
+                rows.position, rows.velocity, rows.birth, rows.columns, exceptional[low:high],
+                self.system.K_exact, interval.begin, interval.length,
+            )  # fmt: skip
+
+        share(care, len(parts))
+        self.impacts += sum(impacts)
+
+    def events(self) -> None:
+        """Nothing listens to births, impacts and deaths yet; what will goes here."""
+
+    def deaths(self, rows: Particles, interval: Interval) -> None:
+        """Take out the rows that a retirement claims."""
+        if not self.system.motion.mortal or not rows.count:
+            return
+        flags = self._flags(rows)
+        parts = _parts(rows.count, 1)
+
+        def retire(k: int) -> None:
+            low, high = parts[k]
+            self.system.retire(
+                rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
+                interval.end, 0.0, low, high,
+            )  # fmt: skip
+
+        share(retire, len(parts))
+        rows.keep(flags)
+
+    def _flags(self, rows: Particles) -> NDArray[np.uint8]:
+        if self.flags.size < rows.capacity:
+            self.flags = np.zeros(rows.capacity, np.uint8)
+        return self.flags
+
+
+def _parts(rows: int, cost: int) -> list[tuple[int, int]]:
+    """Blocks of rows for the threads; `cost` is what a row costs, in rows of the straight pass.
+
+    The blocks follow from the number of rows alone: the last bits of a row may depend on where in
+    a SIMD loop it stands, and must not depend on the number of threads.
+    """
+    sixteenth = -(-rows * cost // 16)
+    return blocks(rows, min(max(sixteenth, SMALLEST_BLOCK), LARGEST_BLOCK) // cost)
