@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 import pytest
+from numba import float32
 
 from motes.jit import STRICT, jit
 from motes.kernel import ELEMENTARY, kernel, phi1, real, sqrt
@@ -62,23 +63,18 @@ def arguments_of(name, precision):
     return [values.astype(REAL[precision]) for values in ranges[name]()]
 
 
-def loop_over(function, count):
-    """A kernel that applies a compiled scalar function to arrays; not kept in the cache."""
-    if count == 1:
+def loop_over(function, count, **options):
+    """A kernel that applies a compiled scalar function to arrays."""
 
-        @jit(inline=True)
-        def run(x, out):
-            for i in range(x.size):
-                out[i] = function(x[i])
+    def one(x, out):
+        for i in range(x.size):
+            out[i] = function(x[i])
 
-    else:
+    def two(x, y, out):
+        for i in range(x.size):
+            out[i] = function(x[i], y[i])
 
-        @jit(inline=True)
-        def run(x, y, out):
-            for i in range(x.size):
-                out[i] = function(x[i], y[i])
-
-    return run
+    return jit(one if count == 1 else two, **options)
 
 
 def computed(name, arguments, precision, **options):
@@ -161,12 +157,12 @@ def test_sine_and_cosine_stay_within_one_where_they_have_no_digits_left(name):
 def test_single_precision_has_no_double_no_call_and_runs_in_wide_registers(name):
     function = ELEMENTARY[name].compiled("single")
     count = 2 if name in ("pow", "atan2") else 1
-    run = loop_over(function, count)
-    run(*[np.ones(4, np.float32)] * (count + 1))
+    run = loop_over(function, count, inline=True)  # Only compiled, and not kept in the cache.
+    run.compile((float32[::1],) * (count + 1))
     (signature,) = run.signatures
     code = run.inspect_llvm(signature)
     body = code[code.index("\ndefine") :].split("\n}")[0]
-    assert "double" not in body
+    assert not re.search(r"\bdouble\b", body)
     assert re.search(r"<(4|8|16) x float>", body)
     machine_code = run.inspect_asm(signature).split(".cfi_endproc")[0]
     assert not re.search(r"^\s*(call|bl)", machine_code, re.MULTILINE)

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from numba import float32
 
 from motes.jit import jit
 from motes.language import Translation
@@ -153,7 +154,7 @@ def test_compiled_noise_is_the_noise(precision, tolerance):
     real = {"single": np.float32, "double": np.float64}[precision]
     octaves, roughness, seed, t = real(2.5), real(0.5), real(9), real(1.25)
 
-    @jit(inline=True)
+    @jit
     def run(x, y, z, velocity, value):
         for i in range(x.size):
             u, v, w = curl_at(x[i], y[i], z[i], t, octaves, roughness, seed)
@@ -167,6 +168,20 @@ def test_compiled_noise_is_the_noise(precision, tolerance):
     arguments = (*place.astype(float), 1.25, 2.5, 0.5, 9)
     np.testing.assert_allclose(velocity, curl(*arguments), atol=tolerance)
     np.testing.assert_allclose(value, fractal_noise(*arguments), atol=20 * tolerance)
-    if precision == "single":
-        code = run.inspect_llvm(run.signatures[0])
-        assert not re.search(r"= f\w+ .*double|fpext", code)
+
+
+def test_single_precision_noise_has_no_double_and_runs_corners_side_by_side():
+    curl_at = compiled(curl, "single")
+
+    @jit(inline=True)  # Only compiled, and not kept in the cache.
+    def run(x, y, z, t, octaves, seed, out):
+        for i in range(x.size):
+            u, v, w = curl_at(x[i], y[i], z[i], t, octaves, t, seed)
+            out[i] = u + v + w
+
+    row = float32[::1]
+    run.compile((row, row, row, float32, float32, float32, row))
+    code = run.inspect_llvm(run.signatures[0])
+    body = code[code.index("\ndefine") :].split("\n}")[0]
+    assert not re.search(r"\bdouble\b", body)
+    assert re.search(r"fmul .*<(4|8|16) x float>", body)
