@@ -1,0 +1,75 @@
+"""`motes info`: what the kept frames of a film are."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import click
+
+from motes.cli.options import json_option
+from motes.cli.progress import rounded
+
+
+@click.command(short_help="Show what kept frames hold.")
+@click.argument("folder", type=click.Path(path_type=Path))
+@json_option
+def command(folder: Path, as_json: bool) -> None:
+    """Show which frames FOLDER keeps, of which scene, and what is in them."""
+    import motes
+
+    store = motes.open_frames(folder)
+    manifest, numbers = store.manifest, store.numbers()
+    facts: dict[str, Any] = {
+        "folder": str(store.folder),
+        "name": manifest.name,
+        "title": manifest.scene.get("title", ""),
+        "version": manifest.version,
+        "digest": manifest.digest,
+        "fps": manifest.fps,
+        "frames": ranges(numbers),
+        "count": len(numbers),
+        "bytes": store.size(),
+        "systems": {},
+    }
+    if numbers:
+        last = store.read(numbers[-1])
+        facts["time"] = last.time
+        facts["systems"] = {
+            name: {key: {"dtype": str(a.dtype), "shape": a.shape} for key, a in columns.items()}
+            for name, columns in last.systems.items()
+        }
+    if as_json:
+        click.echo(json.dumps({**facts, "scene": manifest.scene}, indent=2, ensure_ascii=False))
+        return
+    rows = [
+        ("scene", f"{facts['title'] or manifest.name}"),
+        ("version", f"motes {manifest.version}"),
+        ("digest", manifest.digest),
+        ("frames", f"{facts['frames'] or 'none'} at {manifest.fps:g} a second"),
+        ("size", f"{rounded(facts['bytes'])}B"),
+    ]
+    for name, columns in facts["systems"].items():
+        rows.append((name, f"{_columns(columns)} in frame {numbers[-1]}"))
+    text = click.HelpFormatter()
+    text.write_dl(rows)
+    click.echo(text.getvalue().rstrip())
+
+
+def ranges(numbers: list[int]) -> str:
+    """Whole numbers in order as ranges: `1-48, 60`."""
+    if not numbers:
+        return ""
+    breaks = [(a, b) for a, b in pairwise(numbers) if b != a + 1]
+    firsts = [numbers[0], *(b for _, b in breaks)]
+    lasts = [*(a for a, _ in breaks), numbers[-1]]
+    spans = zip(firsts, lasts, strict=True)
+    return ", ".join(str(a) if a == b else f"{a}-{b}" for a, b in spans)
+
+
+def _columns(columns: dict[str, dict[str, Any]]) -> str:
+    """`8120 particles with position, velocity, ...`."""
+    count = next((column["shape"][0] for column in columns.values() if column["shape"]), 0)
+    return f"{count} particles with {', '.join(columns)}"

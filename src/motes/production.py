@@ -1,0 +1,316 @@
+"""From a scene to a film: simulate, keep every frame, draw it, encode it.
+
+Simulation and drawing use all threads in turn; keeping and encoding follow on one thread of their
+own, so that neither waits for a disk or a codec.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from motes.errors import SceneError
+from motes.frame import Frame
+from motes.record.frames import FrameStore, Manifest, digest_of
+
+if TYPE_CHECKING:
+    from motes.scene import Scene
+    from motes.simulation import Simulation
+
+FRAMES = "frames"
+"""Folder of the kept frames within the folder of a film."""
+
+FORMATS = ("mp4", "webp", "gif")
+
+STILLS = 6
+"""Stills on a contact sheet."""
+
+WAITING = 3
+"""Frames that may wait for the disk and the encoder; more would only use memory."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a film is."""
+
+    done: int = 0
+    """Frames that are finished."""
+
+    total: int = 0
+    """Frames that the film will have."""
+
+    particles: int = 0
+    """Particles in the last frame."""
+
+    particle_steps: int = 0
+    """Steps of integration so far, summed over the particles."""
+
+    simulating: float = 0.0
+    """Time spent on them [s]."""
+
+    compiling: str = ""
+    """Name of the kernel that is being compiled, because no earlier run has kept it."""
+
+    still: Path | None = None
+    """The first picture, once it is written."""
+
+
+Watch = Callable[[Progress], None]
+
+
+@dataclass(frozen=True)
+class Made:
+    """What was written."""
+
+    film: Path | None
+    sheet: Path | None
+    """Contact sheet: stills at even distances in time."""
+
+    frames: Path
+    """Folder of the kept frames."""
+
+    def paths(self) -> list[Path]:
+        """All files and folders, the film first."""
+        return [path for path in (self.film, self.sheet, self.frames) if path is not None]
+
+
+def film(
+    scene: Scene,
+    folder: Path | str,
+    *,
+    name: str = "film",
+    first: int = 1,
+    last: int | None = None,
+    draw: bool = True,
+    form: str = "mp4",
+    watch: Watch | None = None,
+) -> Made:
+    """Simulate a scene and write `name`.mp4, a contact sheet `name`.png and the kept frames.
+
+    Frames are numbered from 1; frame i shows the time (i - 1) / fps. An exception, Ctrl-C included,
+    leaves all finished frames in `folder`/frames, of which `redraw` makes a film.
+
+    Raises:
+        SceneError: `first` and `last` name no frame of the film.
+        OutputError: a file cannot be written.
+        SimulationError: the simulation cannot go on.
+    """
+    from motes.simulation import Simulation
+
+    report = _Report(watch)
+    with report.compiling():
+        simulation = Simulation(scene)
+        numbers = _numbers(first, last, range(1, simulation.frame_count + 1))
+        report.begin(len(numbers))
+        store = FrameStore.create(Path(folder) / FRAMES, _manifest(scene, name))
+        with _Follower() as follower:
+            frames = _kept(simulation, numbers, store, follower, report)
+            if draw:
+                return _drawn(frames, numbers, scene, store, Path(folder), form, follower, report)
+            for _ in frames:
+                report.finished()
+    return Made(None, None, store.folder)
+
+
+def redraw(
+    folder: Path | str,
+    *,
+    values: Mapping[str, Any] | None = None,
+    first: int = 1,
+    last: int | None = None,
+    output: Path | str | None = None,
+    form: str = "mp4",
+    watch: Watch | None = None,
+) -> Made:
+    """Make the film again from the frames that `film` kept in `folder`.
+
+    `values` change what only drawing depends on: {"film.size": [1920, 1080]}, camera, looks.
+
+    Raises:
+        OutputError: there are no frames, or one is damaged.
+        SceneError: a value does not fit, or `first` and `last` name no kept frame.
+    """
+    from motes.scene import from_document
+
+    store = open_frames(folder)
+    scene = from_document(store.manifest.scene, source=str(store.folder / "manifest.json"))
+    scene = scene.with_values(values or {})
+    numbers = _numbers(first, last, store.numbers())
+    report = _Report(watch)
+    report.begin(len(numbers))
+    target = Path(output) if output is not None else store.folder.parent
+    with report.compiling(), _Follower() as follower:
+        frames = report.counted(store.read(number) for number in numbers)
+        return _drawn(frames, numbers, scene, store, target, form, follower, report)
+
+
+def open_frames(folder: Path | str) -> FrameStore:
+    """The kept frames of a film, from its folder or the folder of frames itself.
+
+    Raises:
+        OutputError: there are none.
+    """
+    inner = Path(folder) / FRAMES
+    return FrameStore.open(inner if inner.is_dir() else folder)
+
+
+def _numbers(first: int, last: int | None, there: Iterable[int]) -> list[int]:
+    """The frames that are wanted, of those that there are."""
+    menu = list(there)
+    numbers = [n for n in menu if first <= n and (last is None or n <= last)]
+    if not numbers:
+        wanted = f"{first}-{'' if last is None else last}"
+        has = f"has frames {menu[0]}-{menu[-1]}" if menu else "has no frames yet"
+        raise SceneError(f"no frames {wanted}: the film {has}.", source="frames")
+    return numbers
+
+
+def _manifest(scene: Scene, name: str) -> Manifest:
+    document = scene.document()
+    release = version("motes")
+    owners = (scene, *scene.systems)
+    lists = ("emit", "force", "flow", "solid", "retire")
+    parts = [part for owner in owners for name in lists for part in getattr(owner, name, ())]
+    sources = {f"{part.kind.name}/{part.type}": part.source() for part in parts}
+    digest = digest_of(release, document, sources)
+    return Manifest(name, document, digest, float(scene.film.fps), release)
+
+
+def _kept(
+    simulation: Simulation,
+    numbers: list[int],
+    store: FrameStore,
+    follower: _Follower,
+    report: _Report,
+) -> Iterator[Frame]:
+    """Frames of a simulation, each on its way to the store before anybody draws it."""
+    frames = simulation.frames(first=numbers[0], last=numbers[-1])
+    for frame in report.simulated(frames, simulation):
+        follower.add(store.write, frame)
+        yield frame
+
+
+def _drawn(
+    frames: Iterable[Frame],
+    numbers: list[int],
+    scene: Scene,
+    store: FrameStore,
+    folder: Path,
+    form: str,
+    follower: _Follower,
+    report: _Report,
+) -> Made:
+    """Draw frames into a film and a contact sheet."""
+    from motes.render import Video, contact_sheet
+    from motes.studio import Studio
+
+    studio = Studio(scene)
+    path = folder / f"{store.manifest.name}.{form}"
+    sheet = path.with_suffix(".png")
+    chosen = {numbers[(2 * i + 1) * len(numbers) // (2 * STILLS)] for i in range(STILLS)}
+    stills, times = [], []
+    with ExitStack() as stack:
+        video = stack.enter_context(Video(path, fps=scene.film.fps))
+        stack.callback(follower.wait)
+        for frame in frames:
+            picture = studio.draw(frame)
+            pixels = picture.pixels
+            follower.add(video.write, pixels)
+            if frame.index in chosen:
+                if not stills:
+                    picture.save(sheet)
+                    report.still(sheet)
+                stills.append(pixels)
+                times.append(frame.time)
+            report.finished()
+    contact_sheet(stills, times, sheet)
+    return Made(path, sheet, store.folder)
+
+
+class _Follower:
+    """One thread that does what it is given in order; at most `WAITING` frames wait for it."""
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(1, "motes-follower")
+        self._waiting: deque[Future[Any]] = deque()
+
+    def __enter__(self) -> _Follower:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self._pool.shutdown()
+        if kind is None:
+            self.wait()
+
+    def add(self, task: Callable[[Any], Any], thing: Any) -> None:
+        """Do `task(thing)` soon; an exception of an earlier task is raised here."""
+        while len(self._waiting) >= 2 * WAITING:
+            self._waiting.popleft().result()
+        self._waiting.append(self._pool.submit(task, thing))
+
+    def wait(self) -> None:
+        """Wait for all that was given."""
+        while self._waiting:
+            self._waiting.popleft().result()
+
+
+class _Report:
+    """Keeps the progress of a film and tells it to the one who watches."""
+
+    def __init__(self, watch: Watch | None) -> None:
+        self._watch = watch
+        self._now = Progress()
+
+    def _tell(self, **changes: Any) -> None:
+        self._now = replace(self._now, **changes)
+        if self._watch is not None:
+            self._watch(self._now)
+
+    @contextmanager
+    def compiling(self) -> Iterator[None]:
+        """Tell of every kernel that is compiled within the block."""
+        from motes.jit import listen
+
+        listen(lambda kernel: self._tell(compiling=kernel))
+        try:
+            yield
+        finally:
+            listen(None)
+
+    def begin(self, total: int) -> None:
+        """The number of frames is known."""
+        self._tell(total=total)
+
+    def counted(self, frames: Iterable[Frame]) -> Iterator[Frame]:
+        """Pass frames on and tell how many particles they hold."""
+        for frame in frames:
+            self._tell(particles=frame.count, compiling="")
+            yield frame
+
+    def simulated(self, frames: Iterable[Frame], simulation: Simulation) -> Iterator[Frame]:
+        """Pass frames on and tell what their simulation cost."""
+        begun = time.perf_counter()
+        for frame in frames:
+            self._tell(
+                particles=frame.count,
+                particle_steps=simulation.work,
+                simulating=self._now.simulating + time.perf_counter() - begun,
+                compiling="",
+            )
+            yield frame
+            begun = time.perf_counter()
+
+    def still(self, path: Path) -> None:
+        """The first picture is written."""
+        self._tell(still=path)
+
+    def finished(self) -> None:
+        """One more frame is done."""
+        self._tell(done=self._now.done + 1)
