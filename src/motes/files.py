@@ -44,7 +44,7 @@ def finished(path: Path) -> Iterator[Path]:
     unique = f".{path.stem}.{secrets.token_hex(4)}{PART}{path.suffix}"
     temporary = path.with_name(unique)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         yield temporary
         _sync(temporary)
         os.replace(temporary, path)
@@ -66,6 +66,18 @@ def written_whole(path: Path) -> Iterator[BinaryIO]:
     """
     with finished(path) as temporary, open(temporary, "xb") as file:
         yield file
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those around it, where they do not exist.
+
+    Raises:
+        OutputError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise fault("make the folder", folder, error) from error
 
 
 def content(path: Path) -> bytes:

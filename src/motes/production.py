@@ -10,13 +10,14 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from motes.errors import SceneError
+from motes.files import make_folder
 from motes.frame import Frame
 from motes.record.frames import FrameStore, Manifest, digest_of
 
@@ -113,7 +114,9 @@ def film(
         with _Follower() as follower:
             frames = _kept(simulation, numbers, store, follower, report)
             if draw:
-                return _drawn(frames, numbers, scene, store, Path(folder), form, follower, report)
+                path = Path(folder) / f"{name}.{form}"
+                sheet = _draw(frames, numbers, scene, path, follower, report)
+                return Made(path, sheet, store.folder)
             for _ in frames:
                 report.finished()
     return Made(None, None, store.folder)
@@ -146,9 +149,11 @@ def redraw(
     report = _Report(watch)
     report.begin(len(numbers))
     target = Path(output) if output is not None else store.folder.parent
+    path = target / f"{store.manifest.name}.{form}"
     with report.compiling(), _Follower() as follower:
         frames = report.counted(store.read(number) for number in numbers)
-        return _drawn(frames, numbers, scene, store, target, form, follower, report)
+        sheet = _draw(frames, numbers, scene, path, follower, report)
+    return Made(path, sheet, store.folder)
 
 
 def open_frames(folder: Path | str) -> FrameStore:
@@ -197,41 +202,36 @@ def _kept(
         yield frame
 
 
-def _drawn(
+def _draw(
     frames: Iterable[Frame],
     numbers: list[int],
     scene: Scene,
-    store: FrameStore,
-    folder: Path,
-    form: str,
+    path: Path,
     follower: _Follower,
     report: _Report,
-) -> Made:
-    """Draw frames into a film and a contact sheet."""
+) -> Path:
+    """Draw frames into a film at `path`; gives its contact sheet, until then the first still."""
     from motes.render import Video, contact_sheet
     from motes.studio import Studio
 
     studio = Studio(scene)
-    path = folder / f"{store.manifest.name}.{form}"
     sheet = path.with_suffix(".png")
     chosen = {numbers[(2 * i + 1) * len(numbers) // (2 * STILLS)] for i in range(STILLS)}
     stills, times = [], []
-    with ExitStack() as stack:
-        video = stack.enter_context(Video(path, fps=scene.film.fps))
-        stack.callback(follower.wait)
+    make_folder(path.parent)
+    with Video(path, fps=scene.film.fps) as video, follower.emptied():
         for frame in frames:
             picture = studio.draw(frame)
-            pixels = picture.pixels
-            follower.add(video.write, pixels)
+            follower.add(video.write, picture.pixels)
             if frame.index in chosen:
                 if not stills:
                     picture.save(sheet)
                     report.still(sheet)
-                stills.append(pixels)
+                stills.append(picture.pixels)
                 times.append(frame.time)
             report.finished()
     contact_sheet(stills, times, sheet)
-    return Made(path, sheet, store.folder)
+    return sheet
 
 
 class _Follower:
@@ -254,6 +254,14 @@ class _Follower:
         while len(self._waiting) >= 2 * WAITING:
             self._waiting.popleft().result()
         self._waiting.append(self._pool.submit(task, thing))
+
+    @contextmanager
+    def emptied(self) -> Iterator[None]:
+        """At the end of the block, wait for all that was given, so that nothing uses it later."""
+        try:
+            yield
+        finally:
+            self.wait()
 
     def wait(self) -> None:
         """Wait for all that was given."""

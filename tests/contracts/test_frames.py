@@ -180,7 +180,7 @@ def test_only_old_leftovers_are_swept(tmp_path: Path) -> None:
 def test_a_file_where_a_folder_should_be_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with (
-        pytest.raises(OutputError, match=r"^cannot write .*file/a\.txt: [^\n]+\.$"),
+        pytest.raises(OutputError, match=r"^cannot make the folder .*file: [^\n]+\.$"),
         written_whole(tmp_path / "file" / "a.txt"),
     ):
         pass
