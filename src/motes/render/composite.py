@@ -1,4 +1,4 @@
-"""The kernel that composites a tile: sort its records, blend them front to back, add the backdrop.
+"""The kernel that composites tiles: blend records front to back, then put them over the backdrop.
 
 Each pixel carries light C and transmittance T. A record with weight w and visible part V adds
 C += T V w light, then T *= 1 - V w hidden (Porter and Duff 1984, the over operator, from the
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from motes.jit import jit
-from motes.render.project import TILE
+from motes.render.project import SHORT, TILE
 
 LANES = np.uint64(8)
 """Pixels of a row that are worked on at once; past its support a weight is exactly 0."""
@@ -39,249 +39,16 @@ _LAST = np.float32(TILE - 1)
 
 
 @jit(inline=True)
-def _sort(records: Any, key: Any, order: Any) -> None:
-    """Fill order with the rows from near to far; equal depths keep their order.
-
-    Two passes of a radix sort on the upper 16 bits that vary in the pattern of the float 1/z,
-    which divides each octave of depth evenly.
-    """
-    n = np.uint64(records.shape[0])
-    nearest, farthest = np.uint32(0), np.uint32(0xFFFFFFFF)
-    wide = records.shape[1] > 8
-    for q in range(n):
-        inverse = records[q, 3]
-        if wide:
-            inverse += _HALF * records[q, 10]
-        bits = np.float32(inverse).view(np.uint32)
-        key[0, q] = bits
-        nearest, farthest = max(nearest, bits), min(farthest, bits)
-    shift = np.uint32(0)
-    while ((nearest - farthest) >> shift) > np.uint32(65535):
-        shift += np.uint32(1)
-    count = np.zeros(514, np.uint32)
-    for q in range(n):
-        bits = (nearest - key[0, q]) >> shift
-        key[0, q] = bits
-        count[(bits & np.uint32(255)) + np.uint32(1)] += np.uint32(1)
-        count[(bits >> np.uint32(8)) + np.uint32(258)] += np.uint32(1)
-    for digit in range(256):
-        count[digit + 1] += count[digit]
-        count[digit + 258] += count[digit + 257]
-    for q in range(n):
-        digit = key[0, q] & np.uint32(255)
-        place = count[digit]
-        count[digit] = place + np.uint32(1)
-        key[1, place] = np.uint32(q)
-    for q in range(n):
-        row = key[1, q]
-        digit = (key[0, row] >> np.uint32(8)) + np.uint32(257)
-        place = count[digit]
-        count[digit] = place + np.uint32(1)
-        order[place] = row
-
-
-@jit(inline=True)
-def _still_row(weight: Any, n: Any, x: Any, scale: Any, rest: Any) -> None:
-    """Weights of n pixels at x, x + 1, ...; rest is 1 - v^2 of the row."""
-    for a in range(n):
-        u = (x + np.float32(a)) * scale
-        w = max(rest - u * u, _ZERO)
-        weight[a] = w * w * w
-
-
-@jit(inline=True)
-def _streak_row(
-    weight: Any, n: Any, x: Any, scale: Any, y: Any, ux: Any, uy: Any, way: Any
-) -> None:
-    """Mean weights of n pixels at x, x + 1, ... and y, for a way in radii along (ux, uy)."""
-    per_way = _ONE / way
-    for a in range(n):
-        px = (x + np.float32(a)) * scale
-        u = px * ux + y * uy
-        v = y * ux - px * uy
-        cc = max(_ONE - v * v, _ZERO)
-        c = np.float32(math.sqrt(cc))
-        s = min(max(u, -c), c)
-        t = min(max(u - way, -c), c)
-        ss, tt, c4 = s * s, t * t, cc * cc
-        s *= cc * c4 + ss * (ss * (_THREE_FIFTHS * cc - ss * _SEVENTH) - c4)
-        t *= cc * c4 + tt * (tt * (_THREE_FIFTHS * cc - tt * _SEVENTH) - c4)
-        weight[a] = (s - t) * per_way
-
-
-@jit(inline=True)
-def _blend_row(
-    buffer: Any, at: Any, weight: Any, n: Any, red: Any, green: Any, blue: Any, hidden: Any
-) -> None:
-    for a in range(n):
-        w = weight[a] * buffer[at + _CLEAR + a]
-        buffer[at + a] += w * red
-        buffer[at + _GREEN + a] += w * green
-        buffer[at + _BLUE + a] += w * blue
-        buffer[at + _CLEAR + a] -= w * hidden
-
-
-@jit(inline=True)
-def _hide_row(
-    weight: Any,
-    n: Any,
-    along: Any,
-    step: Any,
-    inverse: Any,
-    change: Any,
-    per_softness: Any,
-    depth: Any,
-    edge: Any,
-    samples: Any,
-) -> None:
-    """Multiply weights by the part of each pixel in which the record lies before the solids.
-
-    along is the place on the streak of the first pixel, 0 to 1 from end to end, and step its
-    change per pixel; depth and edge are the row of pixels.
-    """
-    for a in range(min(n, np.uint64(depth.size))):
-        z = _ONE / (inverse + change * min(max(along + step * np.float32(a), _ZERO), _ONE))
-        row = edge[a]
-        if row < 0:
-            weight[a] *= min(max((depth[a] - z) * per_softness, _ZERO), _ONE)
-            continue
-        part = _ZERO
-        for k in range(4):
-            part += min(max((samples[row, k] - z) * per_softness, _ZERO), _ONE)
-        weight[a] *= part * np.float32(0.25)
-
-
-@jit(inline=True)
-def _draw(
-    record: Any,
-    left: Any,
-    top: Any,
-    buffer: Any,
-    weight: Any,
-    closest: Any,
-    deepest: Any,
-    depth: Any,
-    edge: Any,
-    samples: Any,
-) -> None:
-    """Blend one record into the tile at (left, top), whose solids lie at closest to deepest."""
-    radius = record[2]
-    x = record[0] - np.float32(left) - _HALF
-    y = record[1] - np.float32(top) - _HALF
-    inverse = record[3]
-    dx, dy, change, per_softness = _ZERO, _ZERO, _ZERO, _HARD
-    if record.size > 8:
-        dx, dy, change, per_softness = record[8], record[9], record[10], record[11]
-    other = inverse + change
-    if deepest * max(inverse, other) <= _ONE:
-        return
-    tested = _ONE / min(inverse, other) + _ONE / per_softness > closest
-    scale = _ONE / radius
-    length = np.float32(math.sqrt(dx * dx + dy * dy))
-    still = length == _ZERO
-    way = length * scale
-    ux, uy = _ONE, _ZERO
-    if not still:
-        ux, uy = dx / length, dy / length
-    start, stop = min(x, x + dx) - radius, max(x, x + dx) + radius
-    lowest, highest = min(y, y + dy) - radius + _ONE, max(y, y + dy) + radius
-    steep = abs(uy) > np.float32(0.01)
-    for b in range(np.uint64(max(lowest, _ZERO)), np.uint64(min(highest, _LAST)) + _UNIT):
-        from_y = np.float32(b) - y
-        begin, end = start, stop
-        if steep:
-            # Only between the two sides of the streak.
-            middle, reach = x + from_y * ux / uy, radius / abs(uy)
-            begin, end = max(start, middle - reach), min(stop, middle + reach)
-        if end < _ZERO or begin >= _LAST:
-            continue
-        first = np.uint64(max(begin + _ONE, _ZERO))
-        last = np.uint64(min(end, _LAST))
-        if last < first:
-            continue
-        n = ((last - first) // LANES + _UNIT) * LANES
-        from_x = np.float32(first) - x
-        from_y *= scale
-        if still:
-            _still_row(weight, n, from_x, scale, _ONE - from_y * from_y)
-        else:
-            _streak_row(weight, n, from_x, scale, from_y, ux, uy, way)
-        if tested:
-            along, step = _ZERO, _ZERO
-            if not still:
-                step = ux / length
-                along = from_x * step + from_y * radius * uy / length
-            row = min(np.int64(top) + np.int64(b), depth.shape[0] - 1)
-            pixel = np.int64(left) + np.int64(first)
-            _hide_row(
-                weight,
-                n,
-                along,
-                step,
-                inverse,
-                change,
-                per_softness,
-                depth[row, pixel:],
-                edge[row, pixel:],
-                samples,
-            )
-        at = b * _STRIDE + first
-        _blend_row(buffer, at, weight, n, record[4], record[5], record[6], record[7])
-
-
-@jit(inline=True)
-def _range_of_solids(depth: Any, edge: Any, samples: Any) -> Any:
-    """Nearest and farthest depth in a tile; infinite where there are no solids."""
-    if depth.size == 0:
-        return _FAR, _FAR
-    closest, deepest = _FAR, _ZERO
-    for b in range(depth.shape[0]):
-        for a in range(depth.shape[1]):
-            closest, deepest = min(closest, depth[b, a]), max(deepest, depth[b, a])
-            row = edge[b, a]
-            if row >= 0:
-                for k in range(4):
-                    closest = min(closest, samples[row, k])
-                    deepest = max(deepest, samples[row, k])
-    return closest, deepest
-
-
-@jit(inline=True)
-def _load(buffer: Any, image: Any, fresh: Any) -> None:
-    """Fill the planes of the buffer with what the tile holds so far."""
-    for i in range(_CLEAR):
-        buffer[i] = _ZERO
-    for i in range(_CLEAR, _CLEAR + _PLANE):
-        buffer[i] = _ONE
-    if not fresh:
-        for b in range(image.shape[0]):
-            for a in range(image.shape[1]):
-                for k in range(4):
-                    plane = np.uint64(k) * _PLANE
-                    buffer[plane + np.uint64(b) * _STRIDE + np.uint64(a)] = image[b, a, k]
-
-
-@jit(inline=True)
-def _store(buffer: Any, image: Any, backdrop: Any, final: Any) -> None:
-    for b in range(image.shape[0]):
-        for a in range(image.shape[1]):
-            at = np.uint64(b) * _STRIDE + np.uint64(a)
-            clear = buffer[at + _CLEAR]
-            behind = clear if final else _ZERO
-            image[b, a, 0] = buffer[at] + behind * backdrop[b, a, 0]
-            image[b, a, 1] = buffer[at + _GREEN] + behind * backdrop[b, a, 1]
-            image[b, a, 2] = buffer[at + _BLUE] + behind * backdrop[b, a, 2]
-            image[b, a, 3] = _ONE - clear * (_ONE - backdrop[b, a, 3]) if final else clear
-
-
-@jit(inline=True)
-def _opaque(buffer: Any, width: Any, height: Any) -> Any:
-    """Whether the tile hides everything that follows."""
-    clearest = _ZERO
-    for b in range(np.uint64(height)):
-        for a in range(np.uint64(width)):
-            clearest = max(clearest, buffer[_CLEAR + b * _STRIDE + a])
-    return clearest < OPAQUE
+def _streak(u: Any, v: Any, way: Any) -> Any:
+    """Mean weight times `way` at u along and v across a straight way of `way` radii."""
+    cc = max(_ONE - v * v, _ZERO)
+    c = np.float32(math.sqrt(cc))
+    s = min(max(u, -c), c)
+    t = min(max(u - way, -c), c)
+    ss, tt, c4 = s * s, t * t, cc * cc
+    s *= cc * c4 + ss * (ss * (_THREE_FIFTHS * cc - ss * _SEVENTH) - c4)
+    t *= cc * c4 + tt * (tt * (_THREE_FIFTHS * cc - tt * _SEVENTH) - c4)
+    return s - t
 
 
 @jit
@@ -301,34 +68,119 @@ def composite(
 ) -> None:
     """Composite the tiles [first_tile, last_tile) of image (h, w, 4).
 
-    depth (h, w) is the distance of solids along the axis, or (0, 0) without any; edge (h, w) is
-    the row of `samples` (e, 4) of a pixel on a silhouette, or -1. A fresh image starts clear, one
-    that is not holds C and T of nearer records; a final one is put over the backdrop and gets
-    T replaced by the alpha channel.
+    records holds the rows starts[tile] to starts[tile + 1] of each tile, from near to far. depth
+    (h, w) is the distance of solids along the axis, or (0, 0) without any; edge (h, w) is the row
+    of `samples` (e, 4) of a pixel on a silhouette, or -1. A fresh image starts clear, one that is
+    not holds C and T of nearer records; a final one is put over the backdrop and gets the alpha
+    channel in place of T.
     """
-    longest = 1
-    for tile in range(first_tile, last_tile):
-        longest = max(longest, starts[tile + 1] - starts[tile])
-    key = np.empty((2, longest), np.uint32)
-    order = np.empty(longest, np.uint32)
     buffer = np.empty(_CLEAR + _PLANE, np.float32)
     weight = np.empty(_STRIDE, np.float32)
+    wide = records.shape[1] > 8
     for tile in range(first_tile, last_tile):
-        left, top = (tile % across) * TILE, (tile // across) * TILE
-        low, high = starts[tile], starts[tile + 1]
-        pixels = image[top : top + TILE, left : left + TILE]
-        behind = backdrop[top : top + TILE, left : left + TILE]
-        _load(buffer, pixels, fresh)
-        if high > low:
-            _sort(records[low:high], key, order)
-            closest, deepest = _range_of_solids(
-                depth[top : top + TILE, left : left + TILE],
-                edge[top : top + TILE, left : left + TILE],
-                samples,
-            )
-            for q in range(high - low):
-                record = records[low + np.int64(order[q])]
-                _draw(record, left, top, buffer, weight, closest, deepest, depth, edge, samples)
-                if q & 127 == 127 and _opaque(buffer, pixels.shape[1], pixels.shape[0]):
+        left, top = tile % across * TILE, tile // across * TILE
+        columns, rows = min(TILE, image.shape[1] - left), min(TILE, image.shape[0] - top)
+        buffer[:_CLEAR] = _ZERO
+        buffer[_CLEAR:] = _ONE
+        if not fresh:
+            for b in range(rows):
+                for a in range(columns):
+                    for k in range(4):
+                        place = np.uint64(k) * _PLANE + np.uint64(b) * _STRIDE + np.uint64(a)
+                        buffer[place] = image[top + b, left + a, k]
+        closest, deepest = _FAR, _FAR
+        if depth.shape[0] > 0 and starts[tile] < starts[tile + 1]:
+            deepest = _ZERO
+            for b in range(top, top + rows):
+                for a in range(left, left + columns):
+                    row = edge[b, a]
+                    for k in range(4 if row >= 0 else 1):
+                        d = samples[row, k] if row >= 0 else depth[b, a]
+                        closest, deepest = min(closest, d), max(deepest, d)
+        for i in range(starts[tile], starts[tile + 1]):
+            radius, inverse = records[i, 2], records[i, 3]
+            x = records[i, 0] - np.float32(left) - _HALF
+            y = records[i, 1] - np.float32(top) - _HALF
+            red, green, blue, hidden = records[i, 4], records[i, 5], records[i, 6], records[i, 7]
+            dx, dy, change, per_softness = _ZERO, _ZERO, _ZERO, _HARD
+            if wide:
+                dx, dy = records[i, 8], records[i, 9]
+                change, per_softness = records[i, 10], records[i, 11]
+            near = max(inverse, inverse + change)
+            if _ONE >= deepest * near:
+                continue
+            tested = _ONE + near / per_softness > closest * (near - abs(change))
+            scale = _ONE / radius
+            # One that stands still moves a little to both sides of its place.
+            ux, uy, way = _ONE, _ZERO, SHORT
+            start, stop = x - radius, x + radius
+            slope, reach, slanted = _ZERO, _ZERO, False
+            offset = _HALF * SHORT
+            if dx != _ZERO or dy != _ZERO:
+                length = np.float32(math.sqrt(dx * dx + dy * dy))
+                ux, uy, way, offset = dx / length, dy / length, length * scale, _ZERO
+                start, stop = min(start, start + dx), max(stop, stop + dx)
+                slanted = abs(uy) > np.float32(0.01)
+                if slanted:
+                    slope, reach = ux / uy, radius / abs(uy)
+            per_way = _ONE / way
+            along_step, aside_step = scale * ux, scale * uy
+            lowest = max(min(y, y + dy) - radius + _ONE, _ZERO)
+            highest = min(max(y, y + dy) + radius, _LAST)
+            for b in range(np.uint64(lowest), np.uint64(highest) + _UNIT):
+                from_y = np.float32(b) - y
+                begin, end = start, stop
+                if slanted:
+                    # Only between the two sides of the streak.
+                    middle = x + from_y * slope
+                    begin, end = max(start, middle - reach), min(stop, middle + reach)
+                begin, end = max(begin + _ONE, _ZERO), min(end, _LAST)
+                if end < _ZERO or np.uint64(end) < np.uint64(begin):
+                    continue
+                first = np.uint64(begin)
+                n = ((np.uint64(end) - first) // LANES + _UNIT) * LANES
+                from_x = (np.float32(first) - x) * scale
+                from_y *= scale
+                along, aside = from_x * ux + from_y * uy + offset, from_y * ux - from_x * uy
+                for a in range(n):
+                    part = np.float32(a)
+                    w = _streak(along + part * along_step, aside - part * aside_step, way)
+                    weight[a] = w * per_way
+                if tested:
+                    py = min(top + np.int64(b), image.shape[0] - 1)
+                    for a in range(min(np.int64(n), columns - np.int64(first))):
+                        part = min(max((along + np.float32(a) * along_step) / way, _ZERO), _ONE)
+                        z = _ONE / (inverse + change * part)
+                        px = left + np.int64(first) + a
+                        row = edge[py, px]
+                        many = 4 if row >= 0 else 1
+                        visible = _ZERO
+                        for k in range(many):
+                            d = samples[row, k] if row >= 0 else depth[py, px]
+                            visible += min(max((d - z) * per_softness, _ZERO), _ONE)
+                        weight[a] *= visible / np.float32(many)
+                at = b * _STRIDE + first
+                for a in range(n):
+                    w = weight[a] * buffer[at + _CLEAR + a]
+                    buffer[at + a] += w * red
+                    buffer[at + _GREEN + a] += w * green
+                    buffer[at + _BLUE + a] += w * blue
+                    buffer[at + _CLEAR + a] -= w * hidden
+            if i & 127 == 127:
+                clearest = _ZERO
+                for b in range(np.uint64(rows)):
+                    for a in range(np.uint64(columns)):
+                        clearest = max(clearest, buffer[_CLEAR + b * _STRIDE + a])
+                if clearest < OPAQUE:
                     break
-        _store(buffer, pixels, behind, final)
+        for b in range(rows):
+            for a in range(columns):
+                place = np.uint64(b) * _STRIDE + np.uint64(a)
+                clear = buffer[place + _CLEAR]
+                behind = clear if final else _ZERO
+                for k in range(3):
+                    light = buffer[place + np.uint64(k) * _PLANE]
+                    image[top + b, left + a, k] = light + behind * backdrop[top + b, left + a, k]
+                if final:
+                    clear = _ONE - clear * (_ONE - backdrop[top + b, left + a, 3])
+                image[top + b, left + a, 3] = clear

@@ -22,7 +22,7 @@ FLOOR = np.float32(1.9)
 """Smallest radius drawn [pixels]: the energy of a triweight splat is then even within 2 %."""
 
 SHORT = np.float32(0.02)
-"""Streaks below this length [radii] are drawn as still: the closed form would cancel."""
+"""Length [radii] of what is drawn as still: of less, the closed form would cancel."""
 
 _HALF = np.float32(0.5)
 _ONE = np.float32(1)
@@ -123,12 +123,6 @@ def project(
             records[i, 11] = lens[5]
 
 
-@jit(inline=True)
-def _tile(pixel: Any, tiles: Any) -> Any:
-    """The one of `tiles` tiles in a line that holds a pixel, or the nearest."""
-    return int(min(max(pixel * _PER_TILE, _ZERO), np.float32(tiles - 1)))
-
-
 @jit(flags=STRICT)
 def distribute(records: Any, places: Any, across: Any, down: Any, packed: Any) -> None:
     """Copy each record to every tile that it touches, or with an empty `packed` only count.
@@ -138,6 +132,7 @@ def distribute(records: Any, places: Any, across: Any, down: Any, packed: Any) -
     """
     width = records.shape[1]
     counting = packed.shape[0] == 0
+    last_column, last_row = np.float32(across - 1), np.float32(down - 1)
     for i in range(records.shape[0]):
         radius = records[i, 2]
         if radius < _ZERO:
@@ -149,12 +144,15 @@ def distribute(records: Any, places: Any, across: Any, down: Any, packed: Any) -
             length = np.float32(math.sqrt(dx * dx + dy * dy))
             if length > _ZERO:
                 ux, uy = dx / length, dy / length
-        left, right = min(x, x + dx) - radius, max(x, x + dx) + radius
-        top, bottom = min(y, y + dy) - radius, max(y, y + dy) + radius
+        # In tiles, clipped to the picture before they become integers.
+        left = max((min(x, x + dx) - radius) * _PER_TILE, _ZERO)
+        right = min((max(x, x + dx) + radius) * _PER_TILE, last_column)
+        top = max((min(y, y + dy) - radius) * _PER_TILE, _ZERO)
+        bottom = min((max(y, y + dy) + radius) * _PER_TILE, last_row)
         reach = radius + _TILE_REACH
-        for row in range(_tile(top, down), _tile(bottom, down) + 1):
+        for row in range(int(top), int(bottom) + 1):
             cy = np.float32(row * TILE + TILE // 2) - y
-            for column in range(_tile(left, across), _tile(right, across) + 1):
+            for column in range(int(left), int(right) + 1):
                 cx = np.float32(column * TILE + TILE // 2) - x
                 if abs(cx * uy - cy * ux) > reach:
                     continue  # A slanted streak passes by.

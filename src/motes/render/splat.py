@@ -64,7 +64,7 @@ def splat(
     """
     height, width = backdrop.shape[:2]
     across, down = -(-width // TILE), -(-height // TILE)
-    records = _project(layers, camera, (width, height), shutter, light)
+    records = _from_near_to_far(_project(layers, camera, (width, height), shutter, light))
     image = np.empty((height, width, 4), np.float32)
     slabs = _slabs(records, across, down)
     for number, slab in enumerate(slabs):
@@ -154,28 +154,35 @@ def _pack(records: Array, across: int, down: int) -> tuple[NDArray[np.int64], Ar
     return starts, packed
 
 
+def _from_near_to_far(records: Array) -> Array:
+    """The visible records by falling 1/z at mid-shutter; equal ones in the order given.
+
+    Frames of pure light need no order and keep theirs.
+    """
+    visible = records[:, 2] > 0
+    if not visible.all():
+        records = records[visible]
+    if len(records) == 0 or not np.any(records[:, 7] > 0):
+        return records
+    inverse = records[:, 3] + records[:, 10] / 2 if records.shape[1] > 8 else records[:, 3]
+    # The pattern of a positive float grows evenly within each octave; of the bits that vary the
+    # upper 16 are the key, which NumPy sorts by radix.
+    pattern = np.ascontiguousarray(inverse).view(np.uint32)
+    key = pattern.max() - pattern
+    key >>= np.uint32(max(int(key.max()).bit_length() - 16, 0))
+    return np.take(records, np.argsort(key.astype(np.uint16), kind="stable"), axis=0)
+
+
 def _slabs(records: Array, across: int, down: int) -> list[Array]:
-    """The records in one piece, or cut in depth, front first, where their tiles exceed memory."""
+    """The records in one piece, or cut where their copies in tiles would exceed memory."""
     most = PACKED_BYTES // (4 * records.shape[1])
-    if len(records) * 4 <= most and np.all(records[:, 2] < TILE):
+    radius = records[:, 2]
+    if len(records) * 4 <= most and np.all(radius < TILE):
         return [records]
-    low = np.minimum(records[:, :2], records[:, :2] + _way(records)) - records[:, 2:3]
-    high = np.maximum(records[:, :2], records[:, :2] + _way(records)) + records[:, 2:3]
-    limit = np.array([across, down], np.float32)
-    spans = np.clip(high / TILE + 1, 0, limit) - np.clip(low / TILE - 1, 0, limit)
-    pairs = np.where(records[:, 2] < 0, 0, spans[:, 0] * spans[:, 1]).astype(np.float64)
-    total = float(pairs.sum())
-    if total <= most:
-        return [records]
-    change = records[:, 10] / 2 if records.shape[1] > 8 else 0.0
-    shown = np.flatnonzero(records[:, 2] >= 0)
-    order = shown[np.argsort(-(records[:, 3] + change)[shown], kind="stable")]
-    slab = np.cumsum(pairs[order]) // max(most - across * down, 1)
-    return [records[part] for part in np.split(order, np.flatnonzero(np.diff(slab)) + 1)]
-
-
-def _way(records: Array) -> Array:
-    return records[:, 8:10] if records.shape[1] > 8 else np.zeros((len(records), 2), np.float32)
+    way = np.abs(records[:, 8:10]) if records.shape[1] > 8 else 0.0
+    tiles = np.minimum((2 * radius[:, None] + way) / TILE + 2, (across, down)).astype(np.float64)
+    slab = np.cumsum(tiles[:, 0] * tiles[:, 1]) // max(most - across * down, 1)
+    return np.split(records, np.flatnonzero(np.diff(slab)) + 1)
 
 
 def _cuts(starts: NDArray[np.int64], across: int) -> NDArray[np.int64]:
