@@ -20,6 +20,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding
 import numba
 import numpy as np
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
@@ -36,6 +37,20 @@ EXACT = frozenset({"contract"})
 
 STRICT: frozenset[str] = frozenset()
 """IEEE 754 to the letter: the same bits on any processor of one architecture."""
+
+def _use_full_vectors() -> None:
+    """Let AVX-512 processors use all of their registers.
+
+    LLVM prefers half of them on some, from the days when full ones lowered the clock; our loops
+    gain up to half again. Numba's own setting, NUMBA_CPU_FEATURES, comes first.
+    """
+    if numba.config.CPU_FEATURES is None and numba.config.CPU_NAME is None:
+        features = llvmlite.binding.get_host_cpu_features()
+        if features.get("avx512f"):
+            numba.config.CPU_FEATURES = features.flatten() + ",-prefer-256-bit"
+
+
+_use_full_vectors()
 
 
 def jit(
@@ -254,7 +269,8 @@ _plain_fingerprint: dict[int, tuple[Callable[..., Any], str]] = {}
 def _describe(value: Any, names: tuple[str, ...], seen: frozenset[int]) -> str:
     """What a global means for the code that uses it."""
     if isinstance(value, Dispatcher):
-        return _fingerprint(value.py_func, seen)
+        flags = sorted(value.targetoptions.get("fastmath") or ())
+        return _fingerprint(value.py_func, seen) + repr(flags)
     if isinstance(value, types.FunctionType):
         return _fingerprint(value, seen)
     if isinstance(value, np.ndarray):
@@ -264,6 +280,8 @@ def _describe(value: Any, names: tuple[str, ...], seen: frozenset[int]) -> str:
             return value.__name__
         inner = [name for name in names if hasattr(value, name)]
         return ",".join(name + _describe(getattr(value, name), (), seen) for name in inner)
+    if isinstance(value, type) and hasattr(value, "_fields"):
+        return value.__name__ + repr(value._fields)
     if isinstance(value, type) or callable(value):
         return getattr(value, "__qualname__", repr(type(value)))
     return repr(value)

@@ -8,8 +8,8 @@ from motes.kernel import kernel, sqrt
 class Vortex:
     """A whirl that drives particles around an axis, pulls them in and lifts them.
 
-    With r the distance from the axis, e the unit vectors around, inward and along it:
-    a = (strength e_around + pull e_in + lift e_along) r / (r^2 + core^2) [times 1 m].
+    With r the distance from the axis and e the unit vectors around, inward and along it:
+    a = (strength r e_around + pull r e_in + lift core e_along) / (r^2 + core^2).
     """
 
     strength: Number = quantity(1.0, "m2/s2")
@@ -19,7 +19,7 @@ class Vortex:
     """Acceleration towards the axis at one metre."""
 
     lift: Number = quantity(0.0, "m2/s2")
-    """Acceleration along the axis at one metre."""
+    """Acceleration along the axis, times the core: lift / core on the axis itself."""
 
     position: Vector = quantity((0.0, 0.0, 0.0), "m")
     """A point of the axis."""
@@ -38,10 +38,10 @@ class Vortex:
         y = q.y - p.position[1]
         z = q.z - p.position[2]
         along = x * ax + y * ay + z * az
-        x, y, z = x - along * ax, y - along * ay, z - along * az
-        r2 = x * x + y * y + z * z
-        k = 1.0 / (r2 + p.core * p.core)
-        around, inward, up = p.strength * k, p.pull * k, p.lift * k * sqrt(r2)
+        r2 = x * x + y * y + z * z - along * along
+        k = 1.0 / (max(r2, 0.0) + p.core * p.core)
+        around, inward = p.strength * k, p.pull * k
+        up = p.lift * p.core * k + inward * along
         return (
             around * (ay * z - az * y) - inward * x + up * ax,
             around * (az * x - ax * z) - inward * y + up * ay,

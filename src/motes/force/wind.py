@@ -9,7 +9,7 @@ from motes.noise import noise
 class Wind:
     """Air that carries particles along: a = -(grip / mass) (v - u), with u = velocity (1 + gusts n).
 
-    n(x, t) is smooth noise of mean 0 in [-1, 1] that drifts with the wind.
+    n(x, t) is smooth noise of mean 0 and rms 1 that drifts with the wind.
     """
 
     velocity: Vector = quantity((1.0, 0.0, 0.0), "m/s")
@@ -35,6 +35,7 @@ class Wind:
         x = (q.x - p.velocity[0] * t) * scale
         y = (q.y - p.velocity[1] * t) * scale
         z = (q.z - p.velocity[2] * t) * scale
-        gust = 1.0 + p.gusts * noise(x, y, z, 0.3 * t, p.seed)
+        n, _, _, _ = noise(x, y, z, 0.3 * t, p.seed)
+        gust = 1.0 + p.gusts * n
         k = p.grip / q.mass
         return k, p.velocity[0] * gust, p.velocity[1] * gust, p.velocity[2] * gust
