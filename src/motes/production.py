@@ -22,13 +22,14 @@ from motes.frame import Frame
 from motes.record.frames import FrameStore, Manifest, digest_of
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from motes.scene import Scene
     from motes.simulation import Simulation
 
 FRAMES = "frames"
 """Folder of the kept frames within the folder of a film."""
-
-FORMATS = ("mp4", "webp", "gif")
 
 STILLS = 6
 """Stills on a contact sheet."""
@@ -95,6 +96,7 @@ def film(
 ) -> Made:
     """Simulate a scene and write `name`.mp4, a contact sheet `name`.png and the kept frames.
 
+    `form` is the kind of film: "mp4", "webp" or "gif". `watch` is called with every progress.
     Frames are numbered from 1; frame i shows the time (i - 1) / fps. An exception, Ctrl-C included,
     leaves all finished frames in `folder`/frames, of which `redraw` makes a film.
 
@@ -217,7 +219,8 @@ def _draw(
     studio = Studio(scene)
     sheet = path.with_suffix(".png")
     chosen = {numbers[(2 * i + 1) * len(numbers) // (2 * STILLS)] for i in range(STILLS)}
-    stills, times = [], []
+    stills: list[NDArray[np.uint8]] = []
+    times: list[float] = []
     make_folder(path.parent)
     with Video(path, fps=scene.film.fps) as video, follower.emptied():
         for frame in frames:

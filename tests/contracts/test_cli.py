@@ -16,7 +16,7 @@ from jet import MANIFEST, jet
 import motes
 from motes.cli import COMMANDS, main
 from motes.cli.info import ranges
-from motes.cli.options import Assignment, FrameRange, PictureSize
+from motes.cli.options import assignment, frame_range, picture_size
 from motes.cli.progress import rounded, work
 from motes.errors import (
     MemoryBudgetError,
@@ -141,21 +141,21 @@ def test_a_mistake_is_one_line_and_exit_code_2(
 def test_a_value_is_read_as_toml_and_a_word_needs_no_quotes(text: str, value: Any) -> None:
     if value is None:
         with pytest.raises(Exception, match="is not a value"):
-            Assignment().convert(text, None, None)
+            assignment(text)
     else:
-        read = Assignment().convert(text, None, None)[1]
+        read = assignment(text)[1]
         assert (read, type(read)) == (value, type(value))
 
 
 def test_ranges_of_frames_and_sizes() -> None:
     texts = ("1-48", "12", "10-", "-48")
-    assert [FrameRange().convert(t, None, None) for t in texts] == [
+    assert [frame_range(t) for t in texts] == [
         (1, 48),
         (12, 12),
         (10, None),
         (1, 48),
     ]
-    assert PictureSize().convert("1920x1080", None, None) == [1920, 1080]
+    assert picture_size("1920x1080") == [1920, 1080]
     assert ranges([1, 2, 3, 7, 9, 10]) == "1-3, 7, 9-10"
     assert ranges([]) == ""
 
