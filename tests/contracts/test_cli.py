@@ -328,4 +328,4 @@ def test_numbers_keep_three_digits() -> None:
         "1.5e+04 G",
     ]
     done = Progress(done=1, total=2, particles=3000, particle_steps=10_000, simulating=0.01)
-    assert work(done) == "3 k particles, 1 M particle-steps/s"
+    assert work(done) == "1/2 frames, 3 k particles, 1 M particle-steps/s"

@@ -37,7 +37,7 @@ def _live(name: str) -> Iterator[Callable[[Progress], None]]:
     columns = (
         TextColumn("{task.description}"),
         BarColumn(None),
-        TextColumn("{task.completed}/{task.total} {task.fields[work]}"),
+        TextColumn("{task.fields[work]}"),
         TimeRemainingColumn(),
     )
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
@@ -52,7 +52,7 @@ def _live(name: str) -> Iterator[Callable[[Progress], None]]:
                 task,
                 description=COMPILING if progress.compiling else name,
                 completed=progress.done,
-                total=progress.total,
+                total=progress.total or None,
                 work=work(progress),
             )
 
@@ -77,8 +77,7 @@ class _Lines:
             self._once(f"first picture: {progress.still}")
         if self._verbose and time.monotonic() - self._last > self.EVERY:
             self._last = time.monotonic()
-            share = f"{progress.done}/{progress.total}"
-            click.echo(f"{self._name} {share} {work(progress)}", err=True)
+            click.echo(f"{self._name} {work(progress)}", err=True)
 
     def _once(self, line: str) -> None:
         if line not in self._told:
@@ -87,10 +86,10 @@ class _Lines:
 
 
 def work(progress: Progress) -> str:
-    """Particles and speed: `50.2 k particles, 812 M particle-steps/s`."""
+    """Frames, particles, speed: `12/144 frames, 50.2 k particles, 812 M particle-steps/s`."""
     if not progress.done:
         return ""
-    text = f"{rounded(progress.particles)} particles"
+    text = f"{progress.done}/{progress.total} frames, {rounded(progress.particles)} particles"
     if progress.simulating > 0 and progress.particle_steps:
         rate = progress.particle_steps / progress.simulating
         text += f", {rounded(rate)} particle-steps/s"
