@@ -203,7 +203,8 @@ def test_a_half_plane_hides_its_part_of_a_splat(kind, border):
     column = free.sum(axis=0)
     assert seen.sum() == pytest.approx((column * part).sum(), abs=float(column.max()) / 8)
     assert seen[:, columns >= border].max() == 0
-    assert np.array_equal(seen[:, columns < border - 1], free[:, columns < border - 1])
+    left = columns < border - 1
+    assert seen[:, left] == pytest.approx(free[:, left], abs=3e-4)
 
 
 def test_a_soft_particle_fades_in_front_of_a_solid():
@@ -216,7 +217,7 @@ def test_a_soft_particle_fades_in_front_of_a_solid():
         depth = np.full((SIZE, SIZE), distance, np.float32)
         seen = draw(layer, depths=Depths(depth, edge, samples))
         visible = np.clip((distance - 10) / 2, 0, 1)
-        assert seen[..., 0] == pytest.approx(visible * free[..., 0], abs=1e-5)
+        assert seen[..., 0] == pytest.approx(visible * free[..., 0], abs=3e-4)
 
 
 def test_flux_falls_with_the_square_of_distance_and_radiance_stays():

@@ -123,6 +123,7 @@ def composite(
                 slanted = abs(uy) > np.float32(0.01)
                 if slanted:
                     slope, reach = ux / uy, radius / abs(uy)
+            plain = way == SHORT and not tested
             per_way = _ONE / way
             along_step, aside_step = scale * ux, scale * uy
             lowest = max(min(y, y + dy) - radius + _ONE, _ZERO)
@@ -141,6 +142,19 @@ def composite(
                 n = ((np.uint64(end) - first) // LANES + _UNIT) * LANES
                 from_x = (np.float32(first) - x) * scale
                 from_y *= scale
+                at = b * _STRIDE + first
+                if plain:
+                    # The common case in one loop: the mean over no way at all.
+                    rest = _ONE - from_y * from_y
+                    for a in range(n):
+                        u = from_x + np.float32(a) * scale
+                        w = max(rest - u * u, _ZERO)
+                        w *= w * w * buffer[at + _CLEAR + a]
+                        buffer[at + a] += w * red
+                        buffer[at + _GREEN + a] += w * green
+                        buffer[at + _BLUE + a] += w * blue
+                        buffer[at + _CLEAR + a] -= w * hidden
+                    continue
                 along, aside = from_x * ux + from_y * uy + offset, from_y * ux - from_x * uy
                 for a in range(n):
                     part = np.float32(a)
@@ -159,7 +173,6 @@ def composite(
                             d = samples[row, k] if row >= 0 else depth[py, px]
                             visible += min(max((d - z) * per_softness, _ZERO), _ONE)
                         weight[a] *= visible / np.float32(many)
-                at = b * _STRIDE + first
                 for a in range(n):
                     w = weight[a] * buffer[at + _CLEAR + a]
                     buffer[at + a] += w * red
