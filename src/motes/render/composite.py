@@ -48,7 +48,7 @@ def _streak(u: Any, v: Any, way: Any) -> Any:
     ss, tt, c4 = s * s, t * t, cc * cc
     s *= cc * c4 + ss * (ss * (_THREE_FIFTHS * cc - ss * _SEVENTH) - c4)
     t *= cc * c4 + tt * (tt * (_THREE_FIFTHS * cc - tt * _SEVENTH) - c4)
-    return s - t
+    return max(s - t, _ZERO)  # Rounding must not take light away.
 
 
 @jit
@@ -107,21 +107,20 @@ def composite(
                 dx, dy = records[i, 8], records[i, 9]
                 change, per_softness = records[i, 10], records[i, 11]
             near = max(inverse, inverse + change)
-            if _ONE >= deepest * near:
+            if deepest * near <= _ONE:
                 continue
             tested = _ONE + near / per_softness > closest * (near - abs(change))
             scale = _ONE / radius
             # One that stands still moves a little to both sides of its place.
             ux, uy, way = _ONE, _ZERO, SHORT
             start, stop = x - radius, x + radius
-            slope, reach, slanted = _ZERO, _ZERO, False
+            slope, reach = _ZERO, _ZERO
             offset = _HALF * SHORT
             if dx != _ZERO or dy != _ZERO:
                 length = np.float32(math.sqrt(dx * dx + dy * dy))
                 ux, uy, way, offset = dx / length, dy / length, length * scale, _ZERO
                 start, stop = min(start, start + dx), max(stop, stop + dx)
-                slanted = abs(uy) > np.float32(0.01)
-                if slanted:
+                if abs(uy) > np.float32(0.01):
                     slope, reach = ux / uy, radius / abs(uy)
             plain = way == SHORT and not tested
             per_way = _ONE / way
@@ -131,7 +130,7 @@ def composite(
             for b in range(np.uint64(lowest), np.uint64(highest) + _UNIT):
                 from_y = np.float32(b) - y
                 begin, end = start, stop
-                if slanted:
+                if reach > _ZERO:
                     # Only between the two sides of the streak.
                     middle = x + from_y * slope
                     begin, end = max(start, middle - reach), min(stop, middle + reach)

@@ -160,29 +160,40 @@ def _from_near_to_far(records: Array) -> Array:
 
     Frames of pure light need no order and keep theirs.
     """
-    visible = records[:, 2] > 0
-    if not visible.all():
-        records = records[visible]
-    if len(records) == 0 or not np.any(records[:, 7] > 0):
-        return records
-    inverse = records[:, 3] + records[:, 10] / 2 if records.shape[1] > 8 else records[:, 3]
+    visible = np.flatnonzero(records[:, 2] > 0)
+    if not np.any(records[visible, 7]):
+        return records if len(visible) == len(records) else records[visible]
+    inverse = records[visible, 3]
+    if records.shape[1] > 8:
+        inverse += records[visible, 10] / 2
     # The pattern of a positive float grows evenly within each octave; of the bits that vary the
     # upper 16 are the key, which NumPy sorts by radix.
-    pattern = np.ascontiguousarray(inverse).view(np.uint32)
+    pattern = inverse.view(np.uint32)
     key = pattern.max() - pattern
     key >>= np.uint32(max(int(key.max()).bit_length() - 16, 0))
-    return np.take(records, np.argsort(key.astype(np.uint16), kind="stable"), axis=0)
+    order = visible[np.argsort(key.astype(np.uint16), kind="stable")]
+    sorted_records = np.empty((len(order), records.shape[1]), np.float32)
+    tasks = blocks(len(order), ROWS)
+
+    def task(number: int) -> None:
+        part = slice(*tasks[number])
+        np.take(records, order[part], axis=0, out=sorted_records[part], mode="clip")
+
+    share(task, len(tasks))
+    return sorted_records
 
 
 def _slabs(records: Array, across: int, down: int) -> list[Array]:
     """The records in one piece, or cut where their copies in tiles would exceed memory."""
     most = PACKED_BYTES // (4 * records.shape[1])
-    radius = records[:, 2]
-    if len(records) * 4 <= most and np.all(radius < TILE):
+    extent = 2 * records[:, 2:3]
+    if records.shape[1] > 8:
+        extent = extent + np.abs(records[:, 8:10])
+    widest = np.minimum(extent.max(initial=0.0) / TILE + 2, (across, down)).astype(np.float64)
+    if len(records) * widest.prod() <= most:
         return [records]
-    way = np.abs(records[:, 8:10]) if records.shape[1] > 8 else 0.0
-    tiles = np.minimum((2 * radius[:, None] + way) / TILE + 2, (across, down)).astype(np.float64)
-    slab = np.cumsum(tiles[:, 0] * tiles[:, 1]) // max(most - across * down, 1)
+    tiles = np.minimum(extent / TILE + 2, (across, down)).astype(np.float64)
+    slab = np.cumsum(np.maximum(tiles[:, 0] * tiles[:, 1], 0)) // max(most - across * down, 1)
     return np.split(records, np.flatnonzero(np.diff(slab)) + 1)
 
 
