@@ -8,8 +8,8 @@ components have in common as a `Kind`.
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import pkgutil
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -84,7 +84,7 @@ class Component:
     def __init__(self, *, name: str | None = None, **values: Any) -> None:
         checked, problems = self.check(values)
         if problems:
-            raise SceneError(problems, source=f'{self.kind.noun} "{self.type}"')
+            raise SceneError(problems, source="")
         object.__setattr__(self, "name", name or self.type)
         object.__setattr__(self, "values", checked)
 
@@ -106,7 +106,8 @@ class Component:
 
     @classmethod
     def _unknown(cls, key: str) -> str:
-        menu = ", ".join(p.short() for p in cls.parameters.values()) or "none"
+        own_first = sorted(cls.parameters.values(), key=lambda p: p.name not in cls.own)
+        menu = ", ".join(p.short() for p in own_first) or "none"
         noun = f'{cls.kind.noun} "{cls.type}"'
         return f'{noun} has no parameter "{key}".{likely(key, cls.parameters)} It takes {menu}.'
 
@@ -131,7 +132,8 @@ class Component:
         return hash((type(self), self.name))
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{k}={v!r}' for k, v in self.document().items())})"
+        values = ", ".join(f"{key}={value!r}" for key, value in self.document().items())
+        return f"{type(self).__name__}({values})"
 
     def document(self) -> dict[str, Any]:
         """The component as an entry of a scene file, without values equal to their defaults."""
@@ -197,7 +199,7 @@ def component(cls: type[C] | None = None, *, kind: str = "", name: str = "") -> 
     own = _parameters(cls, family.scope)
     for key in own:
         del body[key]
-    made = type(cls.__name__, (Component,), body)
+    made: Any = type(cls.__name__, (Component,), body)
     made.kind = family
     made.type = name
     made.own = frozenset(own)
@@ -213,9 +215,11 @@ def component(cls: type[C] | None = None, *, kind: str = "", name: str = "") -> 
 
 
 def _parameters(cls: type, scope: str) -> dict[str, Parameter]:
-    """Parameters declared in a class body, named, in order, with the kind's scope where unstated."""
+    """Parameters of a class body, named, in order, with the kind's scope where unstated."""
     return {
-        key: value.named(key, scope) for key, value in vars(cls).items() if isinstance(value, Parameter)
+        key: value.named(key, scope)
+        for key, value in vars(cls).items()
+        if isinstance(value, Parameter)
     }
 
 
@@ -257,15 +261,15 @@ def catalog(kind: str) -> dict[str, type[Component]]:
 def find(kind: str, type: str) -> type[Component]:
     """One component by kind and type, without importing the others where its file is known."""
     known = _registry.entries.get(kind, {})
-    if type not in known and type.isidentifier():
+    if type not in known and type.isidentifier() and not type.startswith("_"):
         module = f"motes.{kind}.{type}"
         if importlib.util.find_spec(module) is not None:
             importlib.import_module(module)
     if type not in _registry.entries.get(kind, {}):
         menu = catalog(kind)
         if type not in menu:
-            noun = kinds(kind).noun
-            raise SceneError(f'no {noun} "{type}".{likely(type, menu)} There are: {", ".join(menu)}.')
+            hint = f"{likely(type, menu)} There are: {', '.join(menu)}."
+            raise SceneError(f'no {kinds(kind).noun} "{type}".{hint}')
     return _registry.entries[kind][type]
 
 
@@ -284,6 +288,3 @@ def attribute(kind: str) -> Callable[[str], type[Component]]:
 def _forget(kind: str, type: str) -> None:
     """Take a component out of the catalog (for tests that declare one)."""
     _registry.entries.get(kind, {}).pop(type, None)
-
-
-_ = sys

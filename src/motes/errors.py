@@ -6,6 +6,9 @@ import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+LONGEST_WORD = 64
+"""Words beyond this length get no hint, because to compare them would take long."""
+
 
 class MotesError(Exception):
     """Base of every error that motes raises on purpose; its text is for the person who reads it."""
@@ -48,7 +51,10 @@ class Problem:
 
 
 class SceneError(MotesError, ValueError):
-    """A scene is not valid. Holds every problem that was found, not only the first."""
+    """A scene is not valid. Holds every problem that was found, not only the first.
+
+    `source` names where it was read from; it is empty where a scene is built in Python.
+    """
 
     exit_code = 2
 
@@ -62,13 +68,22 @@ class SceneError(MotesError, ValueError):
     def lines(self) -> list[str]:
         """One line of text for each problem, in the order of the document."""
         ordered = sorted(self.problems, key=lambda p: (p.line is None, p.line or 0))
-        return [
-            f"{self.source}:{p.line}: {p.message}" if p.line else f"{self.source}: {p.message}"
-            for p in ordered
-        ]
+        return [_printable(f"{self._place(p)}{p.message}") for p in ordered]
+
+    def _place(self, problem: Problem) -> str:
+        if not self.source:
+            return ""
+        return f"{self.source}:{problem.line}: " if problem.line else f"{self.source}: "
+
+
+def _printable(text: str) -> str:
+    """The text on one line: a scene of somebody else must not control the terminal."""
+    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def likely(word: str, menu: Iterable[str]) -> str:
     """A hint such as ` Did you mean "rate"?`, or nothing when no entry of the menu is close."""
+    if len(word) > LONGEST_WORD:
+        return ""
     close = difflib.get_close_matches(word, list(menu), 1, 0.6)
     return f' Did you mean "{close[0]}"?' if close else ""

@@ -23,7 +23,12 @@ SCOPES = ("fixed", "scene", "birth", "particle")
 """How much a value may vary, each including the ones before: not at all, over time, by a draw at
 birth, from particle to particle at every instant."""
 
-SHAPES = {"number": 1, "vector": 3, "color": 4, "integer": 1, "flag": 1}
+SHAPES = {"number": 1, "vector": 3, "color": 4, "integer": 1, "flag": 1, "pair": 2}
+"""Kinds of values and how many numbers each has. A pair is two whole numbers. The others, `text`,
+`choice` and `table`, are no numbers."""
+
+FIXED_SHAPES = ("integer", "flag", "choice", "table", "text", "pair")
+"""Shapes that do not vary unless a parameter says so."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class Parameter:
 
     def named(self, name: str, scope: str) -> Parameter:
         """The parameter with its name, and with a scope where it states none itself."""
-        fixed = self.shape in ("integer", "flag", "choice", "table")
+        fixed = self.shape in FIXED_SHAPES
         return replace(self, name=name, scope=self.scope or ("fixed" if fixed else scope))
 
     def control(self, value: Any) -> Control:
@@ -74,7 +79,8 @@ class Parameter:
             ("at most", self.at_most),
             ("below", self.below),
         )
-        return " and ".join(f"{word} {bound:g}{unit}" for word, bound in bounds if bound is not None)
+        stated = [(word, bound) for word, bound in bounds if bound is not None]
+        return " and ".join(f"{word} {bound:g}{unit}" for word, bound in stated)
 
     def contains(self, low: float, high: float) -> bool:
         """Whether all values from low to high lie in the allowed range."""

@@ -12,9 +12,12 @@ from motes.control.control import Values
 
 _HEX = re.compile(r"#([0-9a-fA-F]{6})([0-9a-fA-F]{2})?\Z")
 
+BRIGHTEST = 1e30
+"""Light beyond it would overflow in single precision."""
+
 
 def parse_color(value: Any, name: str = "color") -> Values:
-    """Linear red, green, blue and alpha from "#rrggbb", "#rrggbbaa" (sRGB) or 3 or 4 linear numbers.
+    """Linear red, green, blue and alpha from "#rrggbb[aa]" (sRGB) or 3 or 4 linear numbers.
 
     Raises ValueError with one line.
     """
@@ -30,11 +33,15 @@ def parse_color(value: Any, name: str = "color") -> Values:
         for v in value:
             if isinstance(v, bool) or not isinstance(v, int | float | np.number):
                 raise ValueError(f"{name} must have numbers, not {v!r}.")
-            numbers.append(float(v))
-        if not np.isfinite(numbers).all():
-            raise ValueError(f"{name} must be finite.")
+            numbers.append(_finite(v, name))
         return np.array([*numbers, 1.0][:4])
     raise ValueError(f'{name} must be "#rrggbb" or [red, green, blue], not {str(value)[:40]}.')
+
+
+def _finite(value: Any, name: str) -> float:
+    if not -BRIGHTEST <= value <= BRIGHTEST:
+        raise ValueError(f"{name} must have finite numbers up to {BRIGHTEST:g}.")
+    return float(value)
 
 
 def linear(encoded: Values) -> Values:

@@ -31,6 +31,13 @@ class Constant(Control):
         """The value."""
         return self.values
 
+    def __eq__(self, other: object) -> bool:
+        """Whether the numbers are equal, however they are written: 1 is 1.0."""
+        return isinstance(other, Constant) and self.values.tolist() == other.values.tolist()
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.values.tolist()))
+
 
 class Setting(Control):
     """A choice, flag or table: a value that shapes the machine code and cannot vary."""

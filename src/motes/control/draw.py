@@ -25,7 +25,9 @@ class Uniform(Control):
 
     def bounds(self) -> tuple[float, float]:
         """The extremes of the interval."""
-        return float(min(self.low.min(), self.high.min())), float(max(self.low.max(), self.high.max()))
+        return float(min(self.low.min(), self.high.min())), float(
+            max(self.low.max(), self.high.max())
+        )
 
 
 class Normal(Control):

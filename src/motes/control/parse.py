@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from datetime import date, time
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -18,11 +20,14 @@ from motes.errors import likely
 from motes.parameter import SCOPES, Parameter
 
 INTERPOLATIONS = ("linear", "smooth", "monotone", "constant", "bezier")
+LARGEST = 1e30
+"""Numbers beyond it would overflow in single precision as soon as they are multiplied."""
+
 EXTRAPOLATIONS = ("hold", "loop", "pingpong", "extend")
 FORMS = {
-    "scene": "{ over = \"time\", keys = [[t, value], ...] }",
+    "scene": '{ over = "time", keys = [[t, value], ...] }',
     "birth": "{ mean = m, spread = s }, { normal = [mean, sigma] }, { choice = [a, b] }",
-    "particle": "{ over = \"life\", keys = [[0, value], [1, value]] }",
+    "particle": '{ over = "life", keys = [[0, value], [1, value]] }',
 }
 
 
@@ -31,19 +36,18 @@ def parse(value: Any, parameter: Parameter) -> Control:
 
     Raises ValueError with one line: the parameter's name, the fault, what is allowed.
     """
-    if isinstance(value, Control):
-        control = value
-    elif parameter.scope == "fixed":
-        return Setting(_setting(value, parameter))
-    elif isinstance(value, Mapping):
-        control = _varying(value, parameter)
-    else:
-        control = Constant(_plain(value, parameter), _tidy(value))
+    if parameter.scope == "fixed":
+        plain = value.document() if isinstance(value, Control) else value
+        return Setting(_setting(plain, parameter))
+    with np.errstate(all="ignore"):  # Extreme keys overflow; the check of the range finds them.
+        control = _control(value, parameter)
+        low, high = control.bounds()
     if SCOPES.index(control.scope) > SCOPES.index(parameter.scope):
         raise ValueError(
             f"{parameter.name} cannot vary {_how(control)}. It takes {_allowed(parameter)}."
         )
-    low, high = control.bounds()
+    if math.isnan(low) or math.isnan(high):
+        raise ValueError(f"{parameter.name}: {_shown(value)} has keys too close to each other.")
     if not parameter.contains(low, high):
         out = low if not parameter.contains(low, low) else high
         unit = f" {parameter.unit}" if parameter.unit else ""
@@ -51,6 +55,16 @@ def parse(value: Any, parameter: Parameter) -> Control:
         equals = "= " if isinstance(control, Constant) else ""
         raise ValueError(f"{parameter.name} {equals}{shown}{unit} must be {parameter.range()}.")
     return control
+
+
+def _control(value: Any, parameter: Parameter) -> Control:
+    if isinstance(value, Control):
+        if value.width != parameter.width:
+            raise ValueError(f"{parameter.name} must be a {parameter.shape}, not {_shown(value)}.")
+        return value
+    if isinstance(value, Mapping):
+        return _varying(value, parameter)
+    return Constant(_plain(value, parameter), _tidy(value))
 
 
 def _tidy(value: Any) -> Any:
@@ -79,7 +93,7 @@ def _allowed(parameter: Parameter) -> str:
 
 
 def _number(value: Any, name: str) -> float:
-    """A finite number."""
+    """A finite number of a size that single precision holds."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.number):
         raise ValueError(f"{name} must be a number, not {_shown(value)}.")
     try:
@@ -88,12 +102,35 @@ def _number(value: Any, name: str) -> float:
         number = math.inf
     if not math.isfinite(number):
         raise ValueError(f"{name} = {number} must be finite.")
+    if abs(number) > LARGEST:
+        raise ValueError(f"{name} = {number:g} must be within -{LARGEST:g} to {LARGEST:g}.")
     return number
 
 
+def _whole(value: Any, parameter: Parameter) -> int:
+    """A whole number within the parameter's range, exact beyond what a float holds."""
+    name = parameter.name
+    number = int(value) if isinstance(value, int | np.integer) else _number(value, name)
+    if isinstance(value, bool) or number != int(number):
+        raise ValueError(f"{name} must be a whole number, not {_shown(value)}.")
+    if not parameter.contains(number, number):
+        unit = f" {parameter.unit}" if parameter.unit else ""
+        raise ValueError(f"{name} = {_shown(int(number))}{unit} must be {parameter.range()}.")
+    return int(number)
+
+
 def _shown(value: Any) -> str:
-    """A short form of a wrong value."""
-    text = repr(value)
+    """A short form of a wrong value, as a scene file writes it."""
+    if isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, str):
+        text = f'"{value}"'
+    elif isinstance(value, date | time):
+        text = value.isoformat()
+    elif isinstance(value, Mapping):
+        text = "{ " + ", ".join(f"{k} = {_shown(v)}" for k, v in islice(value.items(), 9)) + " }"
+    else:
+        text = repr(value)
     return text if len(text) <= 40 else text[:37] + "..."
 
 
@@ -103,18 +140,25 @@ def _plain(value: Any, parameter: Parameter) -> Values:
     if parameter.shape == "color":
         return parse_color(value, name)
     if parameter.shape == "vector":
-        if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str) or len(value) != 3:
+        sequence = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+        if not sequence or len(value) != 3:
             unit = f" {parameter.unit}" if parameter.unit else ""
             raise ValueError(f"{name} must be [x, y, z]{unit}, not {_shown(value)}.")
         return np.array([_number(v, name) for v in value])
+    if parameter.shape == "integer":
+        return np.array([float(_whole(value, parameter))])
     return np.array([_number(value, name)])
 
 
 def _setting(value: Any, parameter: Parameter) -> Any:
-    """A value that shapes the code: a choice, a flag, a whole number, a table."""
+    """A value that cannot vary: a choice, a flag, a text, a table, numbers."""
     name = parameter.name
+    if parameter.shape == "text":
+        if not isinstance(value, str):
+            raise ValueError(f"{name} must be a text in quotes, not {_shown(value)}.")
+        return value
     if parameter.shape == "choice":
-        if value not in parameter.menu:
+        if not isinstance(value, str) or value not in parameter.menu:
             raise ValueError(
                 f"{name} must be one of {', '.join(parameter.menu)}, not {_shown(value)}."
                 + likely(str(value), parameter.menu)
@@ -128,12 +172,17 @@ def _setting(value: Any, parameter: Parameter) -> Any:
         from motes.control.tables import TABLES
 
         return TABLES[parameter.table](_tidy(value), name)
-    number = _number(value, name)
-    if number != int(number):
-        raise ValueError(f"{name} must be a whole number, not {_shown(value)}.")
-    if not parameter.contains(number, number):
-        raise ValueError(f"{name} = {int(number)} must be {parameter.range()}.")
-    return int(number)
+    if parameter.shape == "pair":
+        if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
+            raise ValueError(f"{name} must be two whole numbers, not {_shown(value)}.")
+        return tuple(_whole(v, parameter) for v in value)
+    if parameter.shape == "integer":
+        return _whole(value, parameter)
+    numbers = _plain(value, parameter)
+    if not parameter.contains(numbers.min(), numbers.max()):
+        unit = f" {parameter.unit}" if parameter.unit else ""
+        raise ValueError(f"{name} = {_shown(value)}{unit} must be {parameter.range()}.")
+    return numbers.tolist() if parameter.width > 1 else float(numbers[0])
 
 
 def _varying(value: Mapping[str, Any], parameter: Parameter) -> Control:
@@ -209,7 +258,7 @@ def _curve(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Con
     keys_name = "stops" if "stops" in value else "keys"
     _only(value, ("over", keys_name, "interpolation", "before", "after"), name)
     over = value["over"]
-    if over not in SCOPE_OF:
+    if not isinstance(over, str) or over not in SCOPE_OF:
         raise ValueError(
             f"{name}: over must be one of {', '.join(SCOPE_OF)}, not {_shown(over)}."
             + likely(str(over), SCOPE_OF)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 from motes.errors import likely
 
-BURST_KEYS = ("at", "count", "every", "times")
+MOST = {"at": 1e9, "count": 1e9, "every": 1e9, "times": 1e5}
+"""Keys of a burst and the largest number that each takes."""
 
 
 def bursts(value: Any, name: str) -> list[dict[str, float]]:
@@ -23,19 +23,19 @@ def bursts(value: Any, name: str) -> list[dict[str, float]]:
         if not isinstance(entry, dict) or "count" not in entry:
             raise ValueError(f"{name}: a burst must be {{ at = seconds, count = particles }}.")
         for key, number in entry.items():
-            if key not in BURST_KEYS:
+            if key not in MOST:
                 raise ValueError(
-                    f'{name}: a burst has no key "{key}".{likely(str(key), BURST_KEYS)} '
-                    f"It takes {', '.join(BURST_KEYS)}."
+                    f'{name}: a burst has no key "{key}".{likely(str(key), MOST)} '
+                    f"It takes {', '.join(MOST)}."
                 )
             if isinstance(number, bool) or not isinstance(number, int | float):
                 raise ValueError(f"{name}.{key} must be a number, not {str(number)[:40]}.")
-            if not math.isfinite(number) or number < 0 and key != "at":
-                raise ValueError(f"{name}.{key} = {number} must be finite and at least 0.")
+            if not 0 <= number <= MOST[key]:
+                raise ValueError(f"{name}.{key} = {number} must be from 0 to {MOST[key]:g}.")
         burst = {"at": 0.0, "every": 0.0, "times": 1, **entry}
         for key in ("count", "times"):
-            if burst[key] != int(burst[key]) or burst[key] > 1e9:
-                raise ValueError(f"{name}.{key} = {burst[key]} must be a whole number up to 1e9.")
+            if burst[key] != int(burst[key]):
+                raise ValueError(f"{name}.{key} = {burst[key]} must be a whole number.")
         if burst["times"] > 1 and not burst["every"] > 0:
             raise ValueError(f"{name}: a burst that repeats needs every above 0 s.")
         result.append(burst)
