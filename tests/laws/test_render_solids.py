@@ -61,9 +61,11 @@ def test_depths_are_those_of_the_exact_roots():
     inside = depths.edge < 0
     exact = np.minimum(plane, sphere)
     near = inside & (exact < 40)
-    assert depths.depth[near] == pytest.approx(exact[near], rel=2e-3)
+    # On a sphere it leaves, at a glance, up to the half pixel at which a ray counts as a hit.
+    half_pixel = 0.5 / CAMERA.focal(SIZE[1])
+    assert depths.depth[near] == pytest.approx(exact[near], rel=half_pixel)
     ball = inside & (sphere < 0.97 * plane)
-    assert depths.depth[ball] == pytest.approx(sphere[ball], rel=3e-3)
+    assert depths.depth[ball] == pytest.approx(sphere[ball], rel=half_pixel)
     assert np.isinf(depths.depth[np.isinf(exact)]).all()
 
 

@@ -94,12 +94,12 @@ def test_smoke_meets_the_ball_without_a_cut():
     """Where soft smoke enters a solid the light changes no faster than within the smoke."""
     renderer = Renderer(Film(size=SIZE, bloom=0.0))
     black = Solids(ball_on_lawn, SOLIDS.params, np.zeros((2, 3)))
-    one = np.array([[0.15, 0.4, 0.7]])
+    one = np.array([[0.15, 0.3, 0.7]])
 
     def roughness(softness):
         color = np.ones((1, 4))
         puff = Layer(
-            one, 0 * one, color, np.ones(1), kind="sprites", emission=1.0, softness=softness
+            one, 0 * one, color, np.full(1, 2.0), kind="sprites", emission=1.0, softness=softness
         )
         return renderer.draw([puff], CAMERA, sky=DARK, solids=black).linear[..., 0]
 

@@ -20,6 +20,8 @@ Array = NDArray[np.float32]
 ROWS = 16
 """Rows of pixels per task."""
 
+_ZERO = np.float32(0)
+
 
 def bloom(image: Array, film: Film) -> None:
     """Spread the colour of image (h, w, 4) in place; alpha stays."""
@@ -29,7 +31,7 @@ def bloom(image: Array, film: Film) -> None:
     pyramid = [image]
     for _ in range(octaves):
         height, width = pyramid[-1].shape[:2]
-        smaller = np.empty((-(-height // 2), -(-width // 2), 4), np.float32)
+        smaller = np.zeros((-(-height // 2), -(-width // 2), 4), np.float32)
         _resample(pyramid[-1], smaller, 2, 0.0, 1.0)
         pyramid.append(smaller)
     # From the widest to the finest: each holds the mean of itself and all that are wider.
@@ -43,8 +45,8 @@ def _resample(source: Array, target: Array, factor: int, keep: float, gain: floa
     """target = keep target + gain (source halved for factor 2, doubled for factor 1)."""
     tasks = blocks(len(target), ROWS)
     keep_gain = np.array([keep, gain], np.float32)
-    columns = _taps(target.shape[1], factor)
-    rows = _taps(target.shape[0], factor)
+    columns = _taps(target.shape[1], source.shape[1], factor)
+    rows = _taps(target.shape[0], source.shape[0], factor)
 
     def task(number: int) -> None:
         part = slice(*tasks[number])
@@ -53,8 +55,11 @@ def _resample(source: Array, target: Array, factor: int, keep: float, gain: floa
     share(task, len(tasks))
 
 
-def _taps(count: int, factor: int) -> tuple[NDArray[np.int32], Array]:
-    """Source index and weight, (count, 2 factor), of every target pixel along one axis."""
+def _taps(count: int, size: int, factor: int) -> tuple[NDArray[np.int32], Array]:
+    """Source index and weight, (count, 2 factor), of every target pixel along one axis.
+
+    Outside the `size` source pixels it is dark: weight 0.
+    """
     target = np.arange(count)[:, None]
     if factor == 2:
         index = 2 * target + np.arange(-1, 3)
@@ -62,32 +67,29 @@ def _taps(count: int, factor: int) -> tuple[NDArray[np.int32], Array]:
     else:
         index = (target + np.array([-1, 1])) // 2
         weight = np.where(target % 2 == [0, 1], 0.25, 0.75)
-    return index.astype(np.int32), np.ascontiguousarray(weight, np.float32)
+    weight = np.where((index >= 0) & (index < size), weight, 0.0)
+    return np.clip(index, 0, size - 1).astype(np.int32), weight.astype(np.float32)
 
 
 @jit
 def _gather(
     source: Any, rows: Any, row_weight: Any, columns: Any, column_weight: Any, mix: Any, target: Any
 ) -> None:
-    """Separable weighted sum of source pixels; outside the source it is dark."""
-    height, width = source.shape[0], source.shape[1]
+    """Separable weighted sum of source pixels, mixed into the target."""
+    width = source.shape[1]
+    line = np.empty((width, 4), np.float32)
     for y in range(target.shape[0]):
+        line[:] = _ZERO
+        for j in range(rows.shape[1]):
+            row, w = rows[y, j], row_weight[y, j]
+            for x in range(width):
+                for k in range(4):
+                    line[x, k] += w * source[row, x, k]
         for x in range(target.shape[1]):
-            red, green, blue = np.float32(0), np.float32(0), np.float32(0)
-            for j in range(rows.shape[1]):
-                row = rows[y, j]
-                if row < 0 or row >= height:
-                    continue
+            for k in range(3):
+                light = _ZERO
                 for i in range(columns.shape[1]):
-                    column = columns[x, i]
-                    if column >= 0 and column < width:
-                        w = row_weight[y, j] * column_weight[x, i]
-                        red += w * source[row, column, 0]
-                        green += w * source[row, column, 1]
-                        blue += w * source[row, column, 2]
-            if mix[0] == np.float32(0):  # The target may hold anything yet, even NaN.
-                target[y, x, 0], target[y, x, 1], target[y, x, 2] = red, green, blue
-            else:
-                target[y, x, 0] = mix[0] * target[y, x, 0] + mix[1] * red
-                target[y, x, 1] = mix[0] * target[y, x, 1] + mix[1] * green
-                target[y, x, 2] = mix[0] * target[y, x, 2] + mix[1] * blue
+                    light += column_weight[x, i] * line[columns[x, i], k]
+                # A new target may hold anything yet, even NaN.
+                kept = _ZERO if mix[0] == _ZERO else mix[0] * target[y, x, k]
+                target[y, x, k] = kept + mix[1] * light

@@ -29,8 +29,8 @@ _FAR = np.float32(FAR)
 _TINY = np.float32(1e-30)
 _DARK = np.float32(1 / 64)
 _NOTHING = np.float32(np.inf)
-_CLOSE = np.float32(0.25)
-_SHADOW_FAR = np.float32(100)
+_CLOSE = np.float32(0.5)
+_SHADOW_FAR = np.float32(50)
 _STEPS = 160
 _SHADOW_STEPS = 40
 
@@ -174,7 +174,7 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                         break
                 elif d < _CLOSE * width * t:
                     # The rest of the way, as the last step would have it of a flat face.
-                    t += min(d * step / max(before - d, _TINY), np.float32(4) * width * t)
+                    t += min(d * step / max(before - d, _TINY), np.float32(16) * width * t)
                     distance[i] = t
                     index[i] = which
                     x, y, z = x + t * dx, y + t * dy, z + t * dz
@@ -196,7 +196,7 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                         break
                     x, y, z = x + e * nx, y + e * ny, z + e * nz
                     shadow = True
-                    t, step, before, tries = e, _ZERO, _ZERO, _STEPS - _SHADOW_STEPS
+                    t, step, before, tries = np.float32(2) * e, _ZERO, _ZERO, _STEPS - _SHADOW_STEPS
                     continue
                 elif t > _FAR:
                     break
