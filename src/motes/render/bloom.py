@@ -86,10 +86,12 @@ def _gather(
                 for k in range(4):
                     line[x, k] += w * source[row, x, k]
         for x in range(target.shape[1]):
-            for k in range(3):
-                light = _ZERO
-                for i in range(columns.shape[1]):
-                    light += column_weight[x, i] * line[columns[x, i], k]
-                # A new target may hold anything yet, even NaN.
-                kept = _ZERO if mix[0] == _ZERO else mix[0] * target[y, x, k]
-                target[y, x, k] = kept + mix[1] * light
+            red, green, blue = _ZERO, _ZERO, _ZERO
+            for i in range(columns.shape[1]):
+                column, w = columns[x, i], column_weight[x, i]
+                red += w * line[column, 0]
+                green += w * line[column, 1]
+                blue += w * line[column, 2]
+            target[y, x, 0] = mix[0] * target[y, x, 0] + mix[1] * red
+            target[y, x, 1] = mix[0] * target[y, x, 1] + mix[1] * green
+            target[y, x, 2] = mix[0] * target[y, x, 2] + mix[1] * blue
