@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from motes.errors import SceneError
+from motes.fold import Known, foldable, folded, returned
 from motes.kernel import ELEMENTARY, Elementary
 from motes.source import function_node
 
@@ -36,27 +37,36 @@ class Translation:
     text: list[str] = field(default_factory=list)
     elementary: dict[str, Elementary] = field(default_factory=dict)
     types: dict[str, Any] = field(default_factory=dict)
-    _names: dict[int, str] = field(default_factory=dict)
-    _alive: list[Callable[..., Any]] = field(default_factory=list)
+    returned: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
+    """For each name, what the function returns: literals, None where it varies."""
+    _names: dict[Any, str] = field(default_factory=dict)
 
-    def add(self, function: Callable[..., Any], owner: str) -> str:
+    def add(self, function: Callable[..., Any], owner: str, known: Known | None = None) -> str:
         """Translate a kernel and what it calls; returns its name in the text.
 
-        Raises SceneError where the kernel uses something outside the kernel language.
+        With `known`, values of fields of its first argument, it is folded for these. Raises
+        SceneError where the kernel uses something outside the kernel language.
         """
         function = getattr(function, "py_func", function)
-        known = self._names.get(id(function))
-        if known is not None:
-            return known
+        key = function, tuple(sorted((known or {}).items()))
+        if key in self._names:
+            return self._names[key]
         name = f"{function.__name__}_{len(self._names)}"
-        self._names[id(function)] = name
-        self._alive.append(function)
+        self._names[key] = name
         node = function_node(function)
         rewrite = _Rewrite(self, function, owner)
+        if known:
+            node = folded(node, known, rewrite.references())
+        self.returned[name] = returned(node)
         node = rewrite.visit(node)
         node.name = name
         self.text.append("@inline\n" + ast.unparse(ast.fix_missing_locations(node)))
         return name
+
+
+def can_fold(function: Callable[..., Any]) -> bool:
+    """Whether values may be given for the fields of a kernel's first argument."""
+    return foldable(function_node(function))
 
 
 class _Rewrite(ast.NodeTransformer):
@@ -71,6 +81,10 @@ class _Rewrite(ast.NodeTransformer):
             cells = [cell.cell_contents for cell in function.__closure__]
             self.scope |= dict(zip(code.co_freevars, cells, strict=True))
         self.whole = 0
+
+    def references(self) -> dict[str, Callable[..., Any]]:
+        """Elementary functions by the names that the kernel uses, as Python computes them."""
+        return {k: v.reference for k, v in self.scope.items() if isinstance(v, Elementary)}
 
     def fail(self, node: ast.AST, fault: str) -> SceneError:
         code = self.function.__code__

@@ -100,7 +100,6 @@ def _draw(text: Text, column: Column, n: int, channels: Channels) -> tuple[str, 
 def write_emitter(text: Text, emitter: Component, address: str, channels: Channels) -> None:
     """Write `drawn`, `pose(S)` and `newborn(S, C, t, k, seed, id, channels)` of one emitter."""
     values = text.values
-    shape = text.parameters(emitter, address)
     extra = ", ".join(values.add(emitter.values["velocity"], f"{address}.velocity"))
     pose = [
         *values.add(emitter.values["position"], f"{address}.position"),
@@ -114,10 +113,10 @@ def write_emitter(text: Text, emitter: Component, address: str, channels: Channe
         mark = channels.add(f"{address}#{i // 2}")
         lines += f"    u{i}, u{i + 1} = uniforms(seed, id, {mark})\n"
     numbers = packed([*(f"u{i}" for i in range(draws)), "F(0.0)"])
+    call = text.call(emitter, address, "birth", f"{numbers}, t, k")
     text.add(
         "@inline\ndef newborn(S, C, t, k, seed, id, channels):\n"
-        f"{lines}    x, y, z, vx, vy, vz = {text.kernel(type(emitter), 'birth')}"
-        f"({shape}, {numbers}, t, k)\n    ex, ey, ez = {extra}\n"
+        f"{lines}    x, y, z, vx, vy, vz = {call.source}\n    ex, ey, ez = {extra}\n"
         "    return x, y, z, vx, vy, vz, ex, ey, ez\n"
     )
     write_draws(text, list(values.columns), channels)

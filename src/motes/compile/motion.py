@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from motes.catalog import Component
-from motes.compile.text import AXES, STATE, Text, packed
+from motes.compile.text import AXES, STATE, Call, Text, packed
 from motes.control.control import Control
 from motes.tableau import Explicit, Method, Splitting
 
@@ -74,11 +74,6 @@ class _Writer:
     def __init__(self, text: Text, motion: Motion) -> None:
         self.text, self.motion = text, motion
         self.particle = self._particle()
-        self.forces = [
-            (c, self.text.parameters(c, address)) for address, c in motion.forces
-        ]
-        self.flows = [(c, self.text.parameters(c, address)) for address, c in motion.flows]
-        self.retire = [(c, self.text.parameters(c, address)) for address, c in motion.retire]
 
     def _particle(self) -> str:
         """An expression for `q`: position, velocity, and the columns that components need."""
@@ -113,30 +108,32 @@ class _Writer:
         address, control = self._trait("life")
         return self.text.values.add(control, address, "life", at_birth=True)
 
-    def _sum(self, parts: list[str], vector: tuple[str, str, str]) -> str:
+    def _call(self, address: str, component: Component, kernel: str) -> Call:
+        return self.text.call(component, address, kernel, f"{self.particle}, t")
+
+    def _sum(self, parts: list[Call], vector: tuple[str, str, str]) -> str:
         """Source that adds up calls which give three numbers each into three names."""
         if not parts:
             return "".join(f"    {name} = F(0.0)\n" for name in vector)
-        lines = f"    {', '.join(vector)} = {parts[0]}\n"
+        lines = f"    {', '.join(vector)} = {parts[0].source}\n"
         for call in parts[1:]:
-            lines += f"    dx, dy, dz = {call}\n"
+            lines += f"    dx, dy, dz = {call.source}\n"
             lines += "".join(
-                f"    {name} += {d}\n" for name, d in zip(vector, ("dx", "dy", "dz"), strict=True)
+                f"    {name} += {d}\n"
+                for i, (name, d) in enumerate(zip(vector, ("dx", "dy", "dz"), strict=True))
+                if not call.always_zero(i)
             )
         return lines
 
     def right_hand_side(self) -> None:
         """`carried`: the flows' velocity; `pushed`: acceleration and relaxation, all forces."""
         arguments = ", ".join(STATE)
-        calls = [
-            f"{self.text.kernel(type(c), 'velocity')}({p}, {self.particle}, t)"
-            for c, p in self.flows
-        ]
+        calls = [self._call(address, c, "velocity") for address, c in self.motion.flows]
         direct, relaxing = [], []
-        for c, p in self.forces:
+        for address, c in self.motion.forces:
             for name, found in (("acceleration", direct), ("relaxation", relaxing)):
                 if c.kernel(name) is not None:
-                    found.append(f"{self.text.kernel(type(c), name)}({p}, {self.particle}, t)")
+                    found.append(self._call(address, c, name))
                     break
         if "life" in self.text.values.over:
             self._life()
@@ -149,8 +146,12 @@ class _Writer:
         body = self._sum(direct, ("ax", "ay", "az"))
         body += "    k = F(0.0)\n    bx = F(0.0)\n    by = F(0.0)\n    bz = F(0.0)\n"
         for call in relaxing:
-            body += f"    rate, ux, uy, uz = {call}\n"
-            body += "    k += rate\n    bx += rate * ux\n    by += rate * uy\n    bz += rate * uz\n"
+            body += f"    rate, ux, uy, uz = {call.source}\n    k += rate\n"
+            body += "".join(
+                f"    b{axis} += rate * u{axis}\n"
+                for i, axis in enumerate(AXES, 1)
+                if not call.always_zero(i)
+            )
         self.text.add(
             f"@inline\ndef pushed{head}{body}    return ax, ay, az, k, bx, by, bz\n"
         )
@@ -159,11 +160,11 @@ class _Writer:
         """Source for the slopes k of stage i at a state."""
         call = f"({', '.join(state)}, age + F({share!r}) * h, C, S{i}, L, t{i})"
         x, y, z, vx, vy, vz = state
-        lines = f"    ux{i}, uy{i}, uz{i} = carried{call}\n" if self.flows else ""
+        lines = f"    ux{i}, uy{i}, uz{i} = carried{call}\n" if self.motion.flows else ""
         if not self.motion.inertial:
             return lines
         for axis, v in zip(AXES, (vx, vy, vz), strict=True):
-            flow = f" + u{axis}{i}" if self.flows else ""
+            flow = f" + u{axis}{i}" if self.motion.flows else ""
             lines += f"    k{axis}{i} = {v}{flow}\n"
         lines += f"    ax{i}, ay{i}, az{i}, r, bx, by, bz = pushed{call}\n"
         for axis, v in zip(AXES, (vx, vy, vz), strict=True):
@@ -209,7 +210,7 @@ class _Writer:
         call = f"({', '.join(STATE)}, age + F({begin!r}) * h, C, S{i}, L, t{i})"
         lines = f"    ax, ay, az, r, bx, by, bz = pushed{call}\n"
         lines += f"    g = F({share!r}) * h\n"
-        if any(c.kernel("relaxation") for c, _ in self.forces):
+        if any(c.kernel("relaxation") for _, c in self.motion.forces):
             lines += "    g *= phi1(r * g)\n"
         return lines + "".join(
             f"    v{axis} += g * (a{axis} + b{axis} - r * v{axis})\n" for axis in AXES
@@ -217,7 +218,7 @@ class _Writer:
 
     def _drift(self, share: float, begin: float, places: tuple[float, ...]) -> str:
         lines = f"    d = F({share!r}) * h\n"
-        if not self.flows:
+        if not self.motion.flows:
             return lines + "".join(f"    {axis} += d * v{axis}\n" for axis in AXES)
         first, middle = places.index(begin), places.index(begin + share / 2)
         age = f"age + F({begin!r}) * h"
@@ -241,10 +242,7 @@ class _Writer:
 
     def dies(self) -> None:
         """`dies`: whether any retirement applies."""
-        calls = [
-            f"{self.text.kernel(type(c), 'dies')}({p}, {self.particle}, t)"
-            for c, p in self.retire
-        ]
+        calls = [self._call(address, c, "dies").source for address, c in self.motion.retire]
         self.text.add(
             f"@inline\ndef dies({', '.join(STATE)}, age, C, S, L, t):\n{self._preamble()}"
             f"    return {' | '.join(f'({c})' for c in calls)}\n"

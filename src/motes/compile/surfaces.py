@@ -10,13 +10,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from motes.catalog import Component
-from motes.compile.text import Text
+from motes.compile.text import Text, packed
 from motes.control.constant import Constant
 
 POSE = 12
 HEAD = POSE + 2
 """Numbers before a solid's own parameters."""
 
+MATRIX = {
+    "a": "cy * cz", "b": "sx * sy * cz - cx * sz", "c": "cx * sy * cz + sx * sz",
+    "d": "cy * sz", "e": "sx * sy * sz + cx * cz", "f": "cx * sy * sz - sx * cz",
+    "g": "-sy", "h": "sx * cy", "i": "cx * cy",
+}  # fmt: skip
+"""The rotation matrix by rows, from cosines and sines of the three angles."""
+
+UNTURNED = [f"F({value})" for value in (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)]
 
 CARRIED = """@inline
 def moved(D0, D1, k, x, y, z):
@@ -47,6 +55,8 @@ class Surfaces:
 
     solids: tuple[tuple[str, Component], ...]
     starts: tuple[int, ...]
+    length: int
+    """Numbers in D."""
 
     @property
     def moving(self) -> bool:
@@ -65,27 +75,12 @@ def write_surfaces(text: Text, solids: Sequence[tuple[str, Component]]) -> Surfa
     for k, (address, solid) in enumerate(solids):
         add = lambda key, a=address, s=solid: text.values.add(s.values[key], f"{a}.{key}")  # noqa: E731
         starts.append(len(entries))
-        position, rotation = add("position"), add("rotation")
-        for axis, angle in zip("xyz", rotation, strict=True):
-            lines += f"    {axis} = {angle} * F(0.017453292519943295)\n"
-            lines += f"    c{axis}, s{axis} = cos({axis}), sin({axis})\n"
-        matrix = {
-            "a": "cy * cz", "b": "sx * sy * cz - cx * sz", "c": "cx * sy * cz + sx * sz",
-            "d": "cy * sz", "e": "sx * sy * sz + cx * cz", "f": "cx * sy * sz - sx * cz",
-            "g": "-sy", "h": "sx * cy", "i": "cx * cy",
-        }  # fmt: skip
-        lines += "".join(f"    {name}{k} = {value}\n" for name, value in matrix.items())
-        entries += [*position, *(f"{name}{k}" for name in matrix)]
-        entries += [*add("restitution"), *add("friction")]
-        fields = {}
-        for key in solid.parameters:
-            if key in solid.own:
-                start, width = len(entries), len(expressions := add(key))
-                entries += expressions
-                parts = [f"D[{start + i}]" for i in range(width)]
-                fields[key] = parts[0] if width == 1 else f"({', '.join(parts)})"
-        record = text.record("P", fields or {"nothing": "F(0.0)"})
-        distances.append(_distance(text, solid, record, k, starts[-1]))
+        turned = not _is_default(solid, "rotation")
+        if turned:
+            lines += _rotation(k, add("rotation"))
+        matrix = [f"{name}{k}" for name in MATRIX] if turned else UNTURNED
+        entries += [*add("position"), *matrix, *add("restitution"), *add("friction")]
+        distances.append(_distance(text, solid, address, k, starts[-1], entries, turned))
     text.add(f"@inline\ndef solids(S):\n{lines}    return ({', '.join(entries)},)\n")
     body = "    best, which = solid_0(D, x, y, z), 0\n"
     for k in range(1, len(solids)):
@@ -95,18 +90,46 @@ def write_surfaces(text: Text, solids: Sequence[tuple[str, Component]]) -> Surfa
         text.add(source)
     text.add(f"@inline\ndef near(D, x, y, z):\n{body}    return best, which\n")
     text.add(CARRIED)
-    return Surfaces(tuple(solids), tuple(starts))
+    return Surfaces(tuple(solids), tuple(starts), len(entries))
 
 
-def _distance(text: Text, solid: Component, record: str, k: int, start: int) -> str:
-    """Source of one solid's distance from a point of the scene."""
-    rows = "".join(f"    {a} -= D[{start + i}]\n" for i, a in enumerate("xyz"))
-    local = [
-        " + ".join(f"D[{start + 3 + 3 * row + column}] * {axis}" for row, axis in enumerate("xyz"))
-        for column in range(3)
-    ]
-    name = text.kernel(type(solid), "distance")
-    return (
-        f"@inline\ndef solid_{k}(D, x, y, z):\n{rows}"
-        f"    return {name}({record}, {', '.join(local)})\n"
-    )
+def _is_default(solid: Component, key: str) -> bool:
+    return solid.values[key] == solid.parameters[key].control(solid.parameters[key].default)
+
+
+def _rotation(k: int, angles: Sequence[str]) -> str:
+    """Source of the rotation matrix of solid k from its angles [degrees]."""
+    lines = ""
+    for axis, angle in zip("xyz", angles, strict=True):
+        lines += f"    {axis} = {angle} * F(0.017453292519943295)\n"
+        lines += f"    c{axis}, s{axis} = cos({axis}), sin({axis})\n"
+    return lines + "".join(f"    {name}{k} = {value}\n" for name, value in MATRIX.items())
+
+
+def _distance(
+    text: Text,
+    solid: Component,
+    address: str,
+    k: int,
+    start: int,
+    entries: list[str],
+    turned: bool,
+) -> str:
+    """Source of one solid's distance from a point of the scene; adds its parameters to D."""
+    placed = not _is_default(solid, "position")
+    rows = "".join(f"    {a} -= D[{start + i}]\n" for i, a in enumerate("xyz")) if placed else ""
+    local = ["x", "y", "z"]
+    if turned:
+        local = [
+            " + ".join(f"D[{start + 3 + 3 * row + column}] * {a}" for row, a in enumerate("xyz"))
+            for column in range(3)
+        ]
+
+    def entry(key: str) -> str:
+        expressions = text.values.add(solid.values[key], f"{address}.{key}")
+        first = len(entries)
+        entries.extend(expressions)
+        return packed([f"D[{first + i}]" for i in range(len(expressions))])
+
+    call = text.call(solid, address, "distance", ", ".join(local), entry)
+    return f"@inline\ndef solid_{k}(D, x, y, z):\n{rows}    return {call.source}\n"

@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import linecache
 from collections import namedtuple
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -20,13 +20,27 @@ import numpy as np
 
 from motes.catalog import Component
 from motes.compile.values import Values
+from motes.control.constant import Constant
 from motes.control.curve import TABLE_SIZE
 from motes.jit import FAST, STRICT, cache_folder, jit, written_whole
 from motes.kernel import ELEMENTARY
-from motes.language import Translation
+from motes.language import Translation, can_fold
 
 AXES = ("x", "y", "z")
 STATE = ("x", "y", "z", "vx", "vy", "vz")
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call of a kernel in generated text, and what it is known to give."""
+
+    source: str
+    gives: tuple[float | None, ...]
+    """Literals, None where it varies; empty where nothing is known."""
+
+    def always_zero(self, i: int) -> bool:
+        """Whether the i-th number is always 0, and need not be added."""
+        return i < len(self.gives) and self.gives[i] == 0
 
 
 @dataclass
@@ -45,11 +59,31 @@ class Text:
         """The floating-point type of the module."""
         return np.float32 if self.precision == "single" else np.float64
 
-    def kernel(self, component: type[Component], name: str) -> str:
-        """Translate a component's kernel; returns the name of its function."""
+    def call(
+        self,
+        component: Component,
+        address: str,
+        name: str,
+        arguments: str,
+        entry: Callable[[str], str] | None = None,
+    ) -> Call:
+        """Translate a component's kernel and write a call to it, with its parameters first.
+
+        `entry` writes one parameter, where it is not simply registered as a value.
+        """
         function = component.kernel(name)
         assert function is not None
-        return self.translation.add(function, f'{component.kind.noun} "{component.type}"')
+        known = _defaults(component) if can_fold(function) else {}
+        written = [k for k in component.parameters if k in component.own and k not in known]
+        owner = f'{component.kind.noun} "{component.type}"'
+        kernel = self.translation.add(function, owner, known)
+
+        def registered(key: str) -> str:
+            return packed(self.values.add(component.values[key], f"{address}.{key}"))
+
+        fields = {key: (entry or registered)(key) for key in written}
+        p = self.record("P", fields or {"nothing": "F(0.0)"})
+        return Call(f"{kernel}({p}, {arguments})", self.translation.returned[kernel])
 
     def record(self, name: str, fields: dict[str, str]) -> str:
         """An expression that builds a named tuple with the given expressions as fields."""
@@ -57,14 +91,6 @@ class Text:
         kind = f"{name}_{hashlib.sha1(','.join(names).encode()).hexdigest()[:6]}"
         self.records[kind] = namedtuple(kind, names)  # type: ignore[misc]
         return f"{kind}({', '.join(fields.values())})"
-
-    def parameters(self, component: Component, address: str, only: Sequence[str] = ()) -> str:
-        """An expression for a component's `p`: its own parameters by name."""
-        fields = {
-            key: packed(self.values.add(component.values[key], f"{address}.{key}"))
-            for key in (only or [k for k in component.parameters if k in component.own])
-        }
-        return self.record("P", fields or {"nothing": "F(0.0)"})
 
     def add(self, source: str) -> None:
         """Append a function's source."""
@@ -100,6 +126,16 @@ class Text:
         file = _keep(source)
         exec(compile(source, file, "exec"), scope)
         return scope
+
+
+def _defaults(component: Component) -> dict[str, tuple[float, ...]]:
+    """Own parameters that have their default value, which becomes part of the machine code."""
+    found = {}
+    for key in component.own:
+        control, parameter = component.values[key], component.parameters[key]
+        if isinstance(control, Constant) and control == parameter.control(parameter.default):
+            found[key] = tuple(float(v) for v in control.values)
+    return found
 
 
 def packed(expressions: Sequence[str]) -> str:
