@@ -2,7 +2,7 @@
 
 One million soft dots (two hundred thousand streaks) in a cloud that fills 1920 x 1080, with the
 smallest radius that is drawn, 1.9 pixels. Each time is the best of several. Peers: NumPy with 16
-`np.add.at` calls, one per pixel of the same kernel, which only adds; and datashader, if it is
+`np.add.at` calls, one per pixel of the kernel, which only adds; and datashader, if it is
 installed, which counts points into pixels without any size at all.
 """
 
@@ -121,12 +121,12 @@ def main() -> None:
         for peer in ("NumPy, additive", "datashader, counts")
         if peer in result
     }
+    threads, frame = motes.jit.threads(), result.pop("frame")
     if parser.parse_args().json:
-        threads = motes.jit.threads()
-        print(json.dumps({"threads": threads, "M/s": result, "ratios": ratios}, indent=2))
+        every = {"threads": threads, "M/s": result, "ratios": ratios, "frame [ms]": frame}
+        print(json.dumps(every, indent=2))
         return
-    frame = result.pop("frame")
-    print(f"{WIDTH} x {HEIGHT}, radius {RADIUS} pixels, {motes.jit.threads()} threads")
+    print(f"{WIDTH} x {HEIGHT}, radius {RADIUS} pixels, {threads} threads")
     for name, rate in result.items():
         print(f"{name:24} {rate:8.2f} M particles/s")
     for name, ratio in ratios.items():
