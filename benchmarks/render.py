@@ -1,6 +1,6 @@
 """Particles drawn per second, beside peers in the same run: python benchmarks/render.py [--json].
 
-One million soft dots (two hundred thousand streaks) in a cloud that fills 1920 x 1080, with the
+Two million soft dots (two hundred thousand streaks) in a cloud that fills 1920 x 1080, with the
 smallest radius that is drawn, 1.9 pixels. Each time is the best of several. Peers: NumPy with 16
 `np.add.at` calls, one per pixel of the kernel, which only adds; and datashader, if it is
 installed, which counts points into pixels without any size at all.
