@@ -1,0 +1,6 @@
+"""The document: read, checked, addressed, written."""
+
+from motes.scene.document import Scene, System, from_document
+from motes.scene.sections import Camera, Film, Sky
+
+__all__ = ["Camera", "Film", "Scene", "Sky", "System", "from_document"]
