@@ -8,7 +8,21 @@ from dataclasses import dataclass
 from typing import Any
 
 from motes.catalog import KINDS, Component, catalog, find, kinds
+from motes.errors import SceneError, likely
+from motes.integrate import method, methods
 from motes.parameter import Parameter
+
+DOCUMENT = "document"
+"""Kind of the tables that a scene itself has."""
+
+TABLES = {
+    "scene": "",
+    "film": "[film]",
+    "camera": "[camera]",
+    "sky": "[sky]",
+    "system": '[[system]]\nname = "water"',
+}
+"""Tables of a scene, and how each begins in TOML."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +43,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Entry:
-    """One component, or one integrator."""
+    """One component, integrator, or table of a scene."""
 
     kind: str
     name: str
@@ -53,39 +67,63 @@ class Group:
 
 
 def describe() -> tuple[Group, ...]:
-    """Everything in the catalog, kinds in the order of a time step."""
-    return tuple(describe_kind(kind) for kind in KINDS)
+    """Everything that a scene can hold: its tables, then kinds in the order of a time step."""
+    return tuple(describe_kind(kind) for kind in (DOCUMENT, *KINDS))
 
 
 def describe_kind(kind: str) -> Group:
-    """All components of a kind.
+    """All components of a kind, or the tables of a scene.
 
     Raises:
         SceneError: there is no such kind.
     """
-    names = _methods() if kind == "integrate" else catalog(kind)
-    text = _text(importlib.import_module(f"motes.{kind}"))
-    entries = tuple(describe_component(kind, name) for name in names)
+    if kind == DOCUMENT:
+        text, names = "The tables of a scene.", list(TABLES)
+    elif kind == "integrate":
+        text, names = _text(importlib.import_module("motes.integrate")), list(methods())
+    else:
+        _known(kind)
+        text, names = _text(importlib.import_module(f"motes.{kind}")), list(catalog(kind))
+    entries = tuple(describe_entry(kind, name) for name in names)
     return Group(kind, _summary(text), text, entries)
 
 
-def describe_component(kind: str, name: str) -> Entry:
-    """One component with its parameters.
+def describe_entry(kind: str, name: str) -> Entry:
+    """One component, integrator, or table of a scene, with its parameters.
 
     Raises:
-        SceneError: there is no such kind or component.
+        SceneError: there is no such kind, or nothing of that name in it.
     """
+    if kind == DOCUMENT:
+        return _table(name)
     if kind == "integrate":
-        from motes.integrate import method
-
         method(name)
         text = _text(importlib.import_module(f"motes.integrate.{name}"))
         return Entry(kind, name, _summary(text), text, (), f'integrator = "{name}"')
-    if kind not in KINDS:
-        catalog(kind)
+    _known(kind)
     entry = find(kind, name)
     text = _text(entry)
     return Entry(kind, name, _summary(text), text, _fields(entry), _example(kind, name))
+
+
+def _known(kind: str) -> None:
+    if kind not in KINDS:
+        menu = (*KINDS, *TABLES)
+        raise SceneError(f'no kind "{kind}".{likely(kind, menu)} There are: {", ".join(menu)}.')
+
+
+def _table(name: str) -> Entry:
+    from motes import scene
+
+    sections: dict[str, Any] = {table: getattr(scene, table.capitalize()) for table in TABLES}
+    if name not in sections:
+        menu = ", ".join(TABLES)
+        raise SceneError(f'a scene has no table "{name}".{likely(name, TABLES)} It has {menu}.')
+    section = sections[name]
+    help = section.help()
+    fields = tuple(field(p, help.get(key, "")) for key, p in section.parameters.items())
+    text = _text(section)
+    return Entry(DOCUMENT, name, _summary(text), text, fields, TABLES[name])
 
 
 def _example(kind: str, name: str) -> str:
@@ -93,12 +131,6 @@ def _example(kind: str, name: str) -> str:
         return f'look = {{ type = "{name}" }}'
     owner = "system." if kind in ("emit", "retire") else ""
     return f'[[{owner}{kind}]]\ntype = "{name}"'
-
-
-def _methods() -> dict[str, Any]:
-    from motes.integrate import methods
-
-    return dict(methods())
 
 
 def _fields(entry: type[Component]) -> tuple[Field, ...]:

@@ -12,6 +12,7 @@ from motes.cli.options import complete_scene, json_option
 
 if TYPE_CHECKING:
     import motes
+    from motes.errors import Problem
 
 
 @click.command(short_help="Find all mistakes in scenes.")
@@ -30,7 +31,7 @@ def command(ctx: click.Context, scenes: tuple[str, ...], as_json: bool, quiet: b
 
     report: list[dict[str, Any]] = []
     for name in scenes:
-        problems: tuple[motes.Problem, ...] = ()
+        problems: tuple[Problem, ...] = ()
         try:
             scene = motes.load(name)
         except motes.SceneError as error:

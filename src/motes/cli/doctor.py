@@ -15,9 +15,9 @@ from motes.cli.options import json_option
 @click.pass_context
 def command(ctx: click.Context, as_json: bool) -> None:
     """Look at versions, processor, memory, folders, encoders and extras; a fix for each fault."""
-    import motes
+    from motes.doctor import examine
 
-    findings = list(motes.examine())
+    findings = list(examine())
     if as_json:
         click.echo(json.dumps([asdict(finding) for finding in findings], indent=2))
     else:

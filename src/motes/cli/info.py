@@ -18,9 +18,9 @@ from motes.cli.progress import rounded
 @json_option
 def command(folder: Path, as_json: bool) -> None:
     """Show which frames FOLDER keeps, of which scene, and what is in them."""
-    import motes
+    from motes.production import open_frames
 
-    store = motes.open_frames(folder)
+    store = open_frames(folder)
     manifest, numbers = store.manifest, store.numbers()
     facts: dict[str, Any] = {
         "folder": str(store.folder),

@@ -15,9 +15,10 @@ from motes.cli.options import complete_scene
 @click.option("--force", is_flag=True, help="Overwrite a file that is there.")
 def command(name: str, path: Path | None, force: bool) -> None:
     """Copy the scene NAME of the gallery to PATH, with a comment on each choice."""
-    import motes
+    from motes.files import written_whole
+    from motes.scene import gallery_text
 
-    text = motes.gallery_text(name)
+    text = gallery_text(name)
     target = path if path is not None else Path(f"{name}.toml")
     if target.is_dir():
         target = target / f"{name}.toml"
@@ -25,7 +26,7 @@ def command(name: str, path: Path | None, force: bool) -> None:
         raise click.UsageError(f"{target}: a scene is saved as .toml. Write {target}.toml")
     if target.exists() and not force:
         raise click.UsageError(f"{target} is there already. Add --force to overwrite it.")
-    with motes.written_whole(target) as file:
+    with written_whole(target) as file:
         file.write(text.encode())
     click.echo(target)
     click.echo(f"Change it, then: motes run {target}", err=True)

@@ -114,7 +114,7 @@ def complete_scene(ctx: click.Context, param: click.Parameter, incomplete: str) 
     """Names of the gallery, and files where none begins so."""
     from click.shell_completion import CompletionItem
 
-    from motes import gallery
+    from motes.scene import gallery
 
     names = [CompletionItem(name) for name in gallery() if name.startswith(incomplete)]
     return names or [CompletionItem(incomplete, type="file")]

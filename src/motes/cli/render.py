@@ -35,13 +35,14 @@ def command(
     motes render out --size 1920x1080 --set camera.field_of_view=30
     """
     import motes
+    from motes.production import open_frames
 
     if threads is not None:
         motes.threads(threads)
     values = dict(assignments)
     if size is not None:
         values["film.size"] = size
-    name = motes.open_frames(folder).manifest.name
+    name = open_frames(folder).manifest.name
     with shown(name, quiet=quiet, verbose=verbose) as watch:
         made = motes.redraw(
             folder, values=values, first=frames[0], last=frames[1],

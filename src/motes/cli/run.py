@@ -70,7 +70,9 @@ def make(
         _tell_kept(folder)
         raise
     if verbose:
-        size_kept = motes.open_frames(folder).size()
+        from motes.production import open_frames
+
+        size_kept = open_frames(folder).size()
         click.echo(f"{rounded(size_kept)}B of frames", err=True)
     for path in made.paths():
         click.echo(path)
@@ -78,11 +80,12 @@ def make(
 
 def _tell_kept(folder: Path) -> None:
     """Say what a run that ended early has left, and how to go on."""
-    import motes
+    from motes.errors import OutputError
+    from motes.production import open_frames
 
     try:
-        kept = len(motes.open_frames(folder).numbers())
-    except motes.OutputError:
+        kept = len(open_frames(folder).numbers())
+    except OutputError:
         kept = 0
     if kept:
         click.echo(

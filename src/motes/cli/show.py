@@ -12,17 +12,18 @@ import click
 from motes.cli.options import json_option
 
 if TYPE_CHECKING:
-    from motes import Entry, Field, Group
+    from motes.describe import Entry, Field, Group
 
 
 def _complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[str]:
-    import motes
+    from motes.catalog import KINDS
+    from motes.describe import TABLES, describe_kind
 
     kind = ctx.params.get("kind")
     if param.name == "kind":
-        names: Iterable[str] = motes.KINDS
+        names: Iterable[str] = (*KINDS, *TABLES)
     else:
-        names = (entry.name for entry in motes.describe_kind(kind).entries) if kind else ()
+        names = (entry.name for entry in describe_kind(kind).entries) if kind in KINDS else ()
     return [name for name in names if name.startswith(incomplete)]
 
 
@@ -37,17 +38,20 @@ def command(kind: str | None, name: str | None, as_json: bool) -> None:
     motes show               all kinds and their components, and the scenes of the gallery
     motes show force         all forces
     motes show force drag    one force and its parameters
+    motes show camera        a table of the scene: scene, film, camera, sky or system
     """
-    import motes
+    from motes.describe import DOCUMENT, TABLES, describe, describe_entry, describe_kind
 
+    if kind in TABLES and name is None:
+        kind, name = DOCUMENT, kind
     if kind is None:
-        found: Any = motes.describe()
+        found: Any = describe()
         lines = _overview(found)
     elif name is None:
-        found = motes.describe_kind(kind)
+        found = describe_kind(kind)
         lines = _group(found)
     else:
-        found = motes.describe_component(kind, name)
+        found = describe_entry(kind, name)
         lines = _entry(found)
     if as_json:
         data = [asdict(each) for each in found] if isinstance(found, tuple) else asdict(found)
@@ -57,14 +61,14 @@ def command(kind: str | None, name: str | None, as_json: bool) -> None:
 
 
 def _overview(groups: tuple[Group, ...]) -> str:
-    import motes
+    from motes.scene import gallery
 
     text = click.HelpFormatter(max_width=100)
     for group in groups:
         _heading(text, group.kind, group.summary)
         _list(text, ((entry.name, entry.summary) for entry in group.entries))
     _heading(text, "scenes", "The gallery: motes run NAME.")
-    _list(text, motes.gallery().items())
+    _list(text, gallery().items())
     return text.getvalue().rstrip()
 
 
@@ -83,7 +87,8 @@ def _entry(entry: Entry) -> str:
     if entry.parameters:
         text.write("\n")
         _list(text, ((_short(field), _long(field)) for field in entry.parameters))
-    text.write("\nIn a scene:\n")
+    if entry.example:
+        text.write("\nIn a scene:\n")
     text.write("".join(f"  {line}\n" for line in entry.example.splitlines()))
     return text.getvalue().rstrip()
 
