@@ -1,6 +1,19 @@
 """The document: read, checked, addressed, written."""
 
 from motes.scene.document import Scene, System, from_document
+from motes.scene.gallery import gallery, gallery_text
+from motes.scene.read import load, loads
 from motes.scene.sections import Camera, Film, Sky
 
-__all__ = ["Camera", "Film", "Scene", "Sky", "System", "from_document"]
+__all__ = [
+    "Camera",
+    "Film",
+    "Scene",
+    "Sky",
+    "System",
+    "from_document",
+    "gallery",
+    "gallery_text",
+    "load",
+    "loads",
+]
