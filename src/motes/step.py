@@ -24,18 +24,24 @@ LARGEST_BLOCK = 1 << 18
 SMALLEST_BLOCK = 1 << 14
 """Rows below which a second thread costs more than it brings."""
 
+WORD = 8
+"""Flags that are looked at together; blocks of rows are multiples of it."""
+
+NOTHING: NDArray[np.int64] = np.zeros(0, np.int64)
+"""No rows."""
+
 
 @dataclass(frozen=True)
 class Interval:
-    """The step that is being taken: from `begin`, `length` seconds long."""
+    """The step that is being taken; one step's `end` is the next one's `begin`, to the last bit."""
 
     begin: float
-    length: float
+    end: float
 
     @property
-    def end(self) -> float:
-        """Time at the end of the step."""
-        return self.begin + self.length
+    def length(self) -> float:
+        """Length of the step [s]."""
+        return self.end - self.begin
 
 
 class Stepper:
@@ -98,6 +104,7 @@ class Stepper:
         """Take the rows that were alive through the step; returns those that may meet a solid."""
         flags = self._flags(rows)
         parts = _parts(alive, 1)
+        found = [NOTHING] * len(parts)
 
         def straight(k: int) -> None:
             low, high = parts[k]
@@ -105,16 +112,16 @@ class Stepper:
                 rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
                 interval.begin, interval.length, low, high,
             )  # fmt: skip
+            if self.system.surfaces is not None:
+                found[k] = _marked(flags, low, high)
 
         share(straight, len(parts))
-        if self.system.surfaces is None:
-            return np.zeros(0, np.int64)
-        return np.flatnonzero(flags[:alive])
+        return np.concatenate([NOTHING, *found])
 
     def exceptions(
         self, rows: Particles, threatened: NDArray[np.int64], alive: int, interval: Interval
     ) -> None:
-        """Take newborns from their birth, and threatened rows through impacts, to the step's end."""
+        """Take newborns from their birth, and threatened rows through impacts, to the end."""
         newborn = np.arange(alive, rows.count, dtype=np.int64)
         exceptional = np.concatenate([threatened, newborn])
         parts = _parts(exceptional.size, 64)
@@ -152,7 +159,7 @@ class Stepper:
 
     def _flags(self, rows: Particles) -> NDArray[np.uint8]:
         if self.flags.size < rows.capacity:
-            self.flags = np.zeros(rows.capacity, np.uint8)
+            self.flags = np.zeros(-(-rows.capacity // WORD) * WORD, np.uint8)
         return self.flags
 
 
@@ -163,4 +170,13 @@ def _parts(rows: int, cost: int) -> list[tuple[int, int]]:
     a SIMD loop it stands, and must not depend on the number of threads.
     """
     sixteenth = -(-rows * cost // 16)
-    return blocks(rows, min(max(sixteenth, SMALLEST_BLOCK), LARGEST_BLOCK) // cost)
+    size = min(max(sixteenth, SMALLEST_BLOCK), LARGEST_BLOCK) // cost
+    return blocks(rows, -(-size // WORD) * WORD)
+
+
+def _marked(flags: NDArray[np.uint8], low: int, high: int) -> NDArray[np.int64]:
+    """Rows from `low`, a whole number of words, to `high` whose flag is set: few, as a rule."""
+    words = np.flatnonzero(flags[low : -(-high // WORD) * WORD].view(np.uint64))
+    near = (low + words[:, np.newaxis] * WORD + np.arange(WORD)).ravel()
+    near = near[flags[near] != 0]
+    return near[: np.searchsorted(near, high)]

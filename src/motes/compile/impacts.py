@@ -115,7 +115,7 @@ def _free(fly: Any) -> Any:
 def _flight(module: dict[str, Any], surfaces: Surfaces, inertial: bool) -> Any:
     """A flight through impacts."""
     fly, total, scene, solids = (module[n] for n in ("fly", "total", "scene", "solids"))
-    near, moved = module["near"], module["moved"]
+    near, moved, threatened = (module[n] for n in ("near", "moved", "threatened"))
     starts, moving = surfaces.starts, surfaces.moving
 
     @jit(flags=EXACT, inline=True)
@@ -232,6 +232,12 @@ def _flight(module: dict[str, Any], surfaces: Surfaces, inertial: bool) -> Any:
                         w = total(x, y, z, vx, vy, vz, born, end, C, K)
                         r = reflect(x, y, z, w, contact, True)
                         vx, vy, vz = vx + r[0] - w[0], vy + r[1] - w[1], vz + r[2] - w[2]
+                break
+            if hits == 0 and not threatened(
+                D, D if not moving else solids(scene(K, end)), x, y, z, vx, vy, vz,
+                a, b, c, va, vb, vc, h,
+            ):  # fmt: skip
+                x, y, z, vx, vy, vz = a, b, c, va, vb, vc
                 break
             w0 = total(x, y, z, vx, vy, vz, born, t, C, K)
             w1 = total(a, b, c, va, vb, vc, born, end, C, K)

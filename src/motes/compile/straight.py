@@ -1,10 +1,7 @@
 """The straight pass: one step of every particle as a SIMD loop, and the retirement loop.
 
 With solids, a row whose path might meet one is left as it was and flagged; the exceptions pass
-takes it through its impacts. The test errs on the safe side: a distance function cannot fall faster
-than one meter a meter, so a path of length l whose ends are d0 and d1 away meets no solid when
-d0 + d1 > l. For the cubic through both ends, l^2 <= 3 (|a|^2 + |b|^2 + |c|^2), where a, b, c are the
-legs of its control polygon.
+takes it through its impacts.
 """
 
 from __future__ import annotations
@@ -12,6 +9,7 @@ from __future__ import annotations
 from motes.compile.motion import Motion, stage_times
 from motes.compile.surfaces import Surfaces
 from motes.compile.text import AXES, STATE, Text
+from motes.compile.threat import END
 
 
 def write_straight(text: Text, motion: Motion, surfaces: Surfaces | None) -> None:
@@ -34,12 +32,12 @@ def write_straight(text: Text, motion: Motion, surfaces: Surfaces | None) -> Non
     stages = range(len(places))
     scene = ", ".join(f"S{i}" for i in stages)
     times = ", ".join(f"t{i}" for i in stages)
-    ends = ", ".join(f"n{n}" for n in STATE)
+    ends = ", ".join(END)
     loop = "    for i in range(x.size):\n"
     loop += f"        age, C = F(t - born[i]), {carried}\n"
     loop += f"        {ends} = advance({row}, age, C, {scene}, L, {times}, h)\n"
     if surfaces is not None:
-        loop += _threat(motion, surfaces)
+        loop += f"        meets = threatened(D0, D1, {row}, {ends}, h)\n"
         loop += "".join(f"        {n}[i] = {n}[i] if meets else n{n}\n" for n in state)
         loop += "        flag[i] = meets\n"
     else:
@@ -59,24 +57,3 @@ def write_straight(text: Text, motion: Motion, surfaces: Surfaces | None) -> Non
 def _block(name: str) -> str:
     axis = "xyz".index(name[-1])
     return f"velocity[{axis}]" if name.startswith("v") else f"position[{axis}]"
-
-
-def _threat(motion: Motion, surfaces: Surfaces) -> str:
-    """Source that sets `meets` where the row's path might meet a solid."""
-    begin = [f"{n}[i]" for n in AXES]
-    if motion.inertial:
-        w0, w1 = [f"v{n}[i]" for n in AXES], [f"nv{n}" for n in AXES]
-    else:
-        w0 = w1 = [f"(n{n} - {n}[i]) / h" for n in AXES]
-    lines = f"        d0, _ = near(D0, {', '.join(begin)})\n"
-    lines += "        d1, _ = near(D1, nx, ny, nz)\n        third = h * F(0.3333333333333333)\n"
-    square = "        l2 = F(0.0)\n"
-    for axis, first, v0, v1 in zip(AXES, begin, w0, w1, strict=True):
-        lines += f"        a{axis}, c{axis} = third * {v0}, third * {v1}\n"
-        lines += f"        b{axis} = n{axis} - {first} - a{axis} - c{axis}\n"
-        square += f"        l2 += a{axis} * a{axis} + b{axis} * b{axis} + c{axis} * c{axis}\n"
-    gap = "        d = d0 + d1\n"
-    if surfaces.moving:  # In the solid's frame the path is longer by what the solid moves.
-        for start in surfaces.starts:
-            gap += f"        d -= carried_by(D0, D1, {start}, {', '.join(begin)})\n"
-    return lines + square + gap + "        meets = (d <= F(0.0)) | (d * d <= F(3.0) * l2)\n"

@@ -21,6 +21,7 @@ from motes.compile.motion import KEPT, Motion, write_motion
 from motes.compile.straight import write_straight
 from motes.compile.surfaces import Surfaces, write_surfaces
 from motes.compile.text import Text
+from motes.compile.threat import write_threat
 from motes.compile.values import Column
 from motes.state import Particles
 
@@ -55,10 +56,12 @@ class CompiledSystem:
         self.K = self.fast.values.arrays(self.fast.real)
         self.K_exact = self.exact.values.arrays(np.float64)
 
-    def _text(self, solids: Addressed, precision: str, strict: bool) -> tuple[Text, Any]:
+    def _text(self, solids: Addressed, precision: str, strict: bool) -> tuple[Text, Surfaces | None]:
         text = Text(precision, strict)
         write_motion(text, self.motion)
         surfaces = write_surfaces(text, solids) if solids else None
+        if surfaces is not None:
+            write_threat(text, self.motion, surfaces)
         return text, surfaces
 
     def _columns(self) -> list[Column]:

@@ -8,6 +8,8 @@ from motes.kernel import kernel
 class Plane:
     """Everything below z = 0 of its own frame is solid."""
 
+    flat = True
+
     @kernel
     def distance(p, x, y, z):
         return z
