@@ -3,6 +3,7 @@
 from motes.scene.document import Scene, System, from_document
 from motes.scene.gallery import gallery, gallery_text
 from motes.scene.read import load, loads
+from motes.scene.schema import schema
 from motes.scene.sections import Camera, Film, Sky
 
 __all__ = [
@@ -16,4 +17,5 @@ __all__ = [
     "gallery_text",
     "load",
     "loads",
+    "schema",
 ]

@@ -33,8 +33,5 @@ def unknown(name: str, what: str) -> SceneError:
     """The error for a scene that is not there."""
     names = _names()
     hint = likely(Path(name).stem, names)
-    menu = ", ".join(names)
-    return SceneError(
-        f'{what} "{name}".{hint} The gallery has: {menu}. A file of your own ends in .toml or .json.',
-        source="",
-    )
+    menu = f"The gallery has: {', '.join(names)}. A file of your own ends in .toml or .json."
+    return SceneError(f'{what} "{name}".{hint} {menu}', source="")
