@@ -16,8 +16,8 @@ from collections.abc import Callable
 import numpy as np
 
 import motes.jit
-from motes.render import Camera, Film, Layer, Renderer, Sky
-from motes.render.splat import splat
+from motes.renderer import Camera, Film, Layer, Renderer, Sky
+from motes.renderer.splat import splat
 
 WIDTH, HEIGHT, RADIUS = 1920, 1080, 1.9
 CAMERA = Camera(position=(0, -6.5, 0), look_at=(0, 0, 0), field_of_view=53.13)

@@ -208,7 +208,10 @@ class _KernelCache(FunctionCache):
             content = b""
         body, checksum = content[:-32], content[-32:]
         if hashlib.sha256(body).digest() == checksum:
-            return self._impl.rebuild(target_context, pickle.loads(body))
+            try:
+                return self._impl.rebuild(target_context, pickle.loads(body))
+            except Exception:
+                pass  # Whatever is wrong with a kept kernel, compiling it again is right.
         if _listener is not None:
             _listener(self._py_func.__name__)
         return None
@@ -243,7 +246,7 @@ def _fingerprint(function: Callable[..., Any], seen: frozenset[int] = frozenset(
     known = _plain_fingerprint.get(id(function))
     if known is not None and known[0] is function:
         return known[1]
-    parts: list[str] = []
+    parts: list[str] = [function.__module__]
     scopes = [function.__globals__]
     if function.__closure__:
         names = function.__code__.co_freevars

@@ -20,6 +20,7 @@ from motes.errors import SceneError
 from motes.files import make_folder
 from motes.frame import Frame
 from motes.record.frames import FrameStore, Manifest, digest_of
+from motes.rehearsal import Rehearsal
 
 if TYPE_CHECKING:
     import numpy as np
@@ -108,7 +109,7 @@ def film(
     from motes.simulation import Simulation
 
     report = _Report(watch)
-    with report.compiling():
+    with Rehearsal(scene) as rehearsal, report.compiling(rehearsal.begin if draw else None):
         simulation = Simulation(scene)
         numbers = _numbers(first, last, range(1, simulation.frame_count + 1))
         report.begin(len(numbers))
@@ -117,6 +118,7 @@ def film(
             frames = _kept(simulation, numbers, store, follower, report)
             if draw:
                 path = Path(folder) / f"{name}.{form}"
+                frames = _after(frames, rehearsal)
                 sheet = _draw(frames, numbers, scene, path, follower, report)
                 return Made(path, sheet, store.folder)
             for _ in frames:
@@ -204,6 +206,21 @@ def _kept(
         yield frame
 
 
+def _after(frames: Iterator[Frame], rehearsal: Rehearsal) -> Iterator[Frame]:
+    """Frames, none of them before the first particles are there and the rehearsal is over.
+
+    So this process compiles what simulates, and never what the other one is compiling.
+    """
+    empty = []
+    for frame in frames:
+        empty.append(frame)
+        if frame.count:
+            break
+    rehearsal.wait()
+    yield from empty
+    yield from frames
+
+
 def _draw(
     frames: Iterable[Frame],
     numbers: list[int],
@@ -213,7 +230,7 @@ def _draw(
     report: _Report,
 ) -> Path:
     """Draw frames into a film at `path`; gives its contact sheet, until then the first still."""
-    from motes.render import Video, contact_sheet
+    from motes.renderer import Video, contact_sheet
     from motes.studio import Studio
 
     studio = Studio(scene)
@@ -285,11 +302,16 @@ class _Report:
             self._watch(self._now)
 
     @contextmanager
-    def compiling(self) -> Iterator[None]:
-        """Tell of every kernel that is compiled within the block."""
+    def compiling(self, also: Callable[[], None] | None = None) -> Iterator[None]:
+        """Tell of every kernel that is compiled within the block, and call `also`."""
         from motes.jit import listen
 
-        listen(lambda kernel: self._tell(compiling=kernel))
+        def tell(kernel: str) -> None:
+            if also is not None:
+                also()
+            self._tell(compiling=kernel)
+
+        listen(tell)
         try:
             yield
         finally:

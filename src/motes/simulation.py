@@ -152,16 +152,20 @@ class Simulation:
 
     def _run(self, steps: int, progress: Callable[[Simulation], None] | None) -> None:
         for _ in range(steps):
-            begin = (self._state.number - self._lead_in) * self.scene.step
-            self._advance(self._state, begin, self.scene.step)
-            self._state.number += 1
+            begin, end = self._step_begin(self._state), self._step_begin(self._state, 1)
+            self._advance(self._state, Interval(begin, end))
             if progress is not None:
                 progress(self)
 
-    def _advance(self, state: State, begin: float, length: float) -> None:
+    def _step_begin(self, state: State, ahead: int = 0) -> float:
+        """Time at which a state's next step begins, or a later one."""
+        return (state.number + ahead - self._lead_in) * self.scene.step
+
+    def _advance(self, state: State, interval: Interval) -> None:
         for name in sorted(state.systems):
             self.work += state.systems[name].count
-            self._steppers[name].step(state.systems[name], Interval(begin, length))
+            self._steppers[name].step(state.systems[name], interval)
+        state.number += 1
 
     def _steps_before(self, time: float) -> int:
         return math.floor(time / self.scene.step + EDGE)
@@ -185,15 +189,10 @@ class Simulation:
         """A copy of the state, taken to a time beyond it by steps and a partial one."""
         state = self._state.copy()
         impacts = {name: s.impacts for name, s in self._steppers.items()}
-        while True:
-            begin = (state.number - self._lead_in) * self.scene.step
-            length = min(self.scene.step, time - begin)
-            if length <= EDGE * self.scene.step:
-                break
-            self._advance(state, begin, length)
-            state.number += 1
-            if length < self.scene.step:
-                break
+        while (ahead := time - self._step_begin(state)) > EDGE * self.scene.step:
+            whole = ahead > (1 - EDGE) * self.scene.step
+            end = self._step_begin(state, 1) if whole else time
+            self._advance(state, Interval(self._step_begin(state), end))
         for name, stepper in self._steppers.items():
             stepper.impacts = impacts[name]
         return state, time

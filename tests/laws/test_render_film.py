@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from motes.render import Film, Picture, Video, contact_sheet
-from motes.render.bloom import bloom
-from motes.render.film import ToneMap
-from motes.render.tone import develop
+from motes.renderer import Film, Picture, Video, contact_sheet
+from motes.renderer.bloom import bloom
+from motes.renderer.film import ToneMap
+from motes.renderer.tone import develop
 
 TONES = get_args(ToneMap)
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from motes.jit import jit
-from motes.render import Camera, Film, Renderer, Sky, Solids, Stars, Sun
-from motes.render.backdrop import backdrop
+from motes.renderer import Camera, Film, Renderer, Sky, Solids, Stars, Sun
+from motes.renderer.backdrop import backdrop
 
 SIZE = (96, 64)
 CAMERA = Camera(position=(0, -8, 2), look_at=(0, 0, 1), field_of_view=40)
@@ -100,7 +100,7 @@ def test_a_shadow_lies_where_the_sun_is_hidden():
 def test_the_backdrop_is_traced_once_while_nothing_changes(monkeypatch):
     calls = []
     monkeypatch.setattr(
-        "motes.render.renderer.backdrop", lambda *a: calls.append(a) or backdrop(*a)
+        "motes.renderer.renderer.backdrop", lambda *a: calls.append(a) or backdrop(*a)
     )
     renderer = Renderer(Film(size=SIZE))
     same = Solids(plane_sphere_box, PARAMS.copy(), COLORS.copy())

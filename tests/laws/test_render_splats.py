@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import motes.jit
-from motes.render import Camera, Film, Layer, Renderer
-from motes.render.splat import Depths, splat
+from motes.renderer import Camera, Film, Layer, Renderer
+from motes.renderer.splat import Depths, splat
 
 # From 10 m away, 53.13 degrees: 64 pixels are 10 m high, a pixel is 10/64 m.
 CAMERA = Camera(
@@ -271,7 +271,7 @@ def test_slabs_of_depth_give_the_picture_of_one_piece(monkeypatch):
         *rng.uniform(-30, 30, (2, 300)), 40.0, y=rng.uniform(-3, 3, 300), emission=0.1, opacity=0.2
     )
     whole = draw(layer, size=(128, 128))
-    monkeypatch.setattr("motes.render.splat.PACKED_BYTES", 20_000)
+    monkeypatch.setattr("motes.renderer.splat.PACKED_BYTES", 20_000)
     # Up to what the early end of an opaque tile leaves out.
     assert draw(layer, size=(128, 128)) == pytest.approx(whole, abs=2 / 4096)
 

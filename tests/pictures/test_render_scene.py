@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from motes.jit import jit
-from motes.render import Camera, Film, Layer, Renderer, Sky, Solids, Stars, Sun
+from motes.renderer import Camera, Film, Layer, Renderer, Sky, Solids, Stars, Sun
 
 SIZE = (320, 180)
 CAMERA = Camera(position=(0.3, -6.5, 1.7), look_at=(0.0, 0.0, 1.1))

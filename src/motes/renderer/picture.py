@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.files import written_whole
-from motes.render.film import Film
-from motes.render.tone import develop
+from motes.renderer.film import Film
+from motes.renderer.tone import develop
 
 
 @dataclass(frozen=True, eq=False)

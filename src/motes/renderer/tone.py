@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.jit import blocks, jit, share
-from motes.render.film import Film, ToneMap
+from motes.renderer.film import Film, ToneMap
 
 Array = NDArray[np.float32]
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.jit import blocks, share
-from motes.render.camera import Camera
-from motes.render.sky import Sky, Sun, shade
-from motes.render.solids import Hits, Solids, trace
-from motes.render.splat import NO_SOLIDS, Depths
+from motes.renderer.camera import Camera
+from motes.renderer.sky import Sky, Sun, shade
+from motes.renderer.solids import Hits, Solids, trace
+from motes.renderer.splat import NO_SOLIDS, Depths
 
 Array = NDArray[np.float32]
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.jit import jit
-from motes.render.camera import Camera, Vector
-from motes.render.layer import Layer
+from motes.renderer.camera import Camera, Vector
+from motes.renderer.layer import Layer
 
 _ZERO = np.float32(0)
 _ONE = np.float32(1)

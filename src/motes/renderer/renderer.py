@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from motes.render.backdrop import Backdrop, backdrop
-from motes.render.bloom import bloom
-from motes.render.camera import Camera, Vector
-from motes.render.film import Film
-from motes.render.layer import Layer
-from motes.render.picture import Picture
-from motes.render.sky import Sky
-from motes.render.solids import Solids
-from motes.render.splat import splat
+from motes.renderer.backdrop import Backdrop, backdrop
+from motes.renderer.bloom import bloom
+from motes.renderer.camera import Camera, Vector
+from motes.renderer.film import Film
+from motes.renderer.layer import Layer
+from motes.renderer.picture import Picture
+from motes.renderer.sky import Sky
+from motes.renderer.solids import Solids
+from motes.renderer.splat import splat
 
 
 class Renderer:

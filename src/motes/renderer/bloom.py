@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.jit import blocks, jit, share
-from motes.render.film import Film
+from motes.renderer.film import Film
 
 Array = NDArray[np.float32]
 

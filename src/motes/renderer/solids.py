@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.jit import jit
-from motes.render.camera import Vector
+from motes.renderer.camera import Vector
 
 Array = NDArray[np.float32]
 

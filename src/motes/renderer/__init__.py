@@ -4,14 +4,14 @@ The renderer knows nothing of scenes. One frame is `Renderer(film).draw(layers, 
 light stays linear float32 from the first splat to the tone map of `Picture`.
 """
 
-from motes.render.camera import Camera
-from motes.render.film import Film
-from motes.render.layer import Layer
-from motes.render.picture import Picture
-from motes.render.renderer import Renderer
-from motes.render.sky import Sky, Stars, Sun
-from motes.render.solids import Solids
-from motes.render.video import Video, contact_sheet
+from motes.renderer.camera import Camera
+from motes.renderer.film import Film
+from motes.renderer.layer import Layer
+from motes.renderer.picture import Picture
+from motes.renderer.renderer import Renderer
+from motes.renderer.sky import Sky, Stars, Sun
+from motes.renderer.solids import Solids
+from motes.renderer.video import Video, contact_sheet
 
 __all__ = [
     "Camera",

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from motes.jit import jit
-from motes.render.project import SHORT, TILE
+from motes.renderer.project import SHORT, TILE
 
 LANES = np.uint64(8)
 """Pixels of a row that are worked on at once; past its support a weight is exactly 0."""

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.jit import blocks, share
-from motes.render.camera import Camera, Vector
-from motes.render.composite import composite
-from motes.render.layer import Layer
-from motes.render.project import TILE, distribute, project
+from motes.renderer.camera import Camera, Vector
+from motes.renderer.composite import composite
+from motes.renderer.layer import Layer
+from motes.renderer.project import TILE, distribute, project
 
 Array = NDArray[np.float32]
 

@@ -1,0 +1,141 @@
+"""The studio: a scene's camera, sky, solids and looks, set up for the renderer at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.catalog import Component
+from motes.compile.surfaces import write_surfaces
+from motes.compile.text import Text
+from motes.control.control import Control
+from motes.control.curve import Curve
+from motes.frame import Frame
+from motes.renderer import Camera, Film, Layer, Picture, Renderer, Sky, Solids, Stars, Sun
+from motes.scene.address import component_address
+from motes.scene.document import Scene
+
+
+def picture(frame: Frame, scene: Scene, *, size: tuple[int, int] | None = None) -> Picture:
+    """Draw one frame of a scene. `size` is (width, height) [pixels], by default the film's.
+
+    For many frames, a `Studio` remembers what stays the same.
+    """
+    return Studio(scene, size=size).draw(frame)
+
+
+class Studio:
+    """Draws frames of one scene; backdrops that do not change are drawn once."""
+
+    def __init__(self, scene: Scene, *, size: tuple[int, int] | None = None) -> None:
+        self.scene = scene
+        film = scene.film
+        width, height = size or film.size
+        self._film = Film(
+            size=(int(width), int(height)), tone=film.tone, bloom=float(film.bloom)
+        )
+        self._renderers: dict[float, Renderer] = {}
+        self._shutter = float(film.shutter) / float(film.fps)
+
+    def draw(self, frame: Frame) -> Picture:
+        """The picture of one frame; the shutter opens at its time."""
+        time = frame.time
+        return self._renderer(time).draw(
+            [self._layer(name, columns, time) for name, columns in frame.systems.items()],
+            self._camera(time),
+            shutter=self._shutter,
+            sky=None if self.scene.film.background == "transparent" else self._sky(time),
+            solids=self._solids(time),
+        )
+
+    def _renderer(self, time: float) -> Renderer:
+        exposure = _one(self.scene.film.exposure, time)
+        if exposure not in self._renderers:
+            film = Film(**{**self._film.__dict__, "exposure": exposure})
+            self._renderers = {exposure: Renderer(film)}
+        return self._renderers[exposure]
+
+    def _camera(self, time: float) -> Camera:
+        camera = self.scene.camera
+        controls = (camera.position, camera.look_at, camera.up, camera.field_of_view)
+        moves = any(isinstance(control, Curve) for control in controls)
+        return self._pose(time, self._pose(time + self._shutter) if moves else None)
+
+    def _pose(self, time: float, close: Camera | None = None) -> Camera:
+        camera = self.scene.camera
+        return Camera(
+            position=_three(camera.position, time),
+            look_at=_three(camera.look_at, time),
+            up=_three(camera.up, time),
+            field_of_view=_one(camera.field_of_view, time),
+            close=close,
+        )
+
+    def _sky(self, time: float) -> Sky:
+        sky = self.scene.sky
+        strength = _one(sky.sun_strength, time)
+        red, green, blue = (strength * c for c in _three(sky.sun_color, time))
+        stars = int(_one(sky.stars, time))
+        return Sky(
+            zenith=_three(sky.zenith, time),
+            horizon=_three(sky.horizon, time),
+            ground=_three(sky.ground, time),
+            sun=Sun(_three(sky.sun_direction, time), (red, green, blue)) if strength else None,
+            stars=Stars(stars) if stars else None,
+        )
+
+    def _layer(self, name: str, columns: Mapping[str, NDArray[Any]], time: float) -> Layer:
+        look = next(s.look for s in self.scene.systems if s.name == name)
+        return Layer(
+            position=columns["position"],
+            velocity=columns["velocity"],
+            color=columns["color"],
+            size=columns["size"],
+            kind=type(look).drawn_as,
+            emission=_one(look.values["emission"], time),
+            opacity=_one(look.values["opacity"], time),
+            softness=_one(look.values["softness"], time),
+        )
+
+    @cached_property
+    def _visible(self) -> list[tuple[str, Component]]:
+        solids = [s for s in self.scene.solid if s.values["visible"].document()]
+        return [(component_address(None, s), s) for s in solids]
+
+    @cached_property
+    def _shapes(self) -> tuple[Any, Any, Any, int]:
+        """Kernels `place` and `nearest` of the visible solids, and what they read."""
+        text = Text("single")
+        surfaces = write_surfaces(text, self._visible)
+        text.add(text.values.scene_text())
+        entries = surfaces.length
+        text.add(
+            "@kernel\ndef place(K, t, out):\n    D = solids(scene(K, t))\n"
+            f"    for i in range({entries}):\n        out[i] = D[i]\n"
+        )
+        row = ", ".join(f"params[{i}]" for i in range(entries))
+        text.add(f"@inline\ndef nearest(params, x, y, z):\n    return near(({row},), x, y, z)\n")
+        module = text.module()
+        return module["place"], module["nearest"], text.values.arrays(np.float32), entries
+
+    def _solids(self, time: float) -> Solids | None:
+        if not self._visible:
+            return None
+        place, nearest, K, entries = self._shapes
+        params = np.empty(entries, np.float32)
+        place(K, time, params)
+        colors = [s.values["color"].at(time)[:3] for _, s in self._visible]
+        return Solids(nearest, params, np.array(colors, np.float32))
+
+
+def _one(control: Control, time: float) -> float:
+    return float(control.at(time)[0])
+
+
+def _three(control: Control, time: float) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in control.at(time)[:3])
+    return x, y, z
