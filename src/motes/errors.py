@@ -9,6 +9,12 @@ from dataclasses import dataclass
 LONGEST_WORD = 64
 """Words beyond this length get no hint, because to compare them would take long."""
 
+LONGEST_LINE = 1000
+"""Characters of a line about one problem."""
+
+MOST_LINES = 100
+"""Problems of one scene that are shown."""
+
 
 class MotesError(Exception):
     """Base of every error that motes raises on purpose; its text is for the person who reads it."""
@@ -66,9 +72,12 @@ class SceneError(MotesError, ValueError):
         super().__init__("\n".join(self.lines()))
 
     def lines(self) -> list[str]:
-        """One line of text for each problem, in the order of the document."""
+        """One line of text for each problem, in the order of the document; not too many."""
         ordered = sorted(self.problems, key=lambda p: (p.line is None, p.line or 0))
-        return [_printable(f"{self._place(p)}{p.message}") for p in ordered]
+        lines = [_printable(f"{self._place(p)}{p.message}") for p in ordered[:MOST_LINES]]
+        if len(ordered) > MOST_LINES:
+            lines.append(f"and {len(ordered) - MOST_LINES} more problems.")
+        return lines
 
     def _place(self, problem: Problem) -> str:
         if not self.source:
@@ -77,7 +86,9 @@ class SceneError(MotesError, ValueError):
 
 
 def _printable(text: str) -> str:
-    """The text on one line: a scene of somebody else must not control the terminal."""
+    """The text on one line: a scene of somebody else must not fill or control the terminal."""
+    if len(text) > LONGEST_LINE:
+        text = text[: LONGEST_LINE - 3] + "..."
     return "".join(c if c.isprintable() else " " for c in text)
 
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
+from motes import integrate
 from motes.catalog import Component, find
 from motes.control.control import Control
 from motes.errors import Problem
-from motes.integrate import methods
 from motes.parameter import quantity
 from motes.scene import names
 from motes.scene.entry import Entry
@@ -23,6 +24,9 @@ Flows = tuple[Annotated[Component, Entry("flow")], ...]
 Solids = tuple[Annotated[Component, Entry("solid")], ...]
 Retirements = tuple[Annotated[Component, Entry("retire")], ...]
 Look = Annotated[Component, Entry("look")]
+
+_METHODS = tuple(sorted(m.name for m in pkgutil.iter_modules(integrate.__path__)))
+"""Names of the methods of time stepping; a scene needs to load only its own."""
 
 
 def _by_name(parts: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -57,7 +61,7 @@ class System(Section):
     capacity: int | None = quantity(None, shape="integer", at_least=1, at_most=1e10)
     """The most particles alive at once; beyond it, none are born."""
 
-    integrator: str | None = quantity(None, menu=tuple(methods()))
+    integrator: str | None = quantity(None, menu=_METHODS)
     """Method of time stepping, where it is not the scene's."""
 
     emit: Emitters = ()
@@ -122,7 +126,7 @@ class Scene(Section):
     prewarm: float = quantity(0.0, "s", at_least=0, at_most=1e5)
     """Time that is simulated before the first frame."""
 
-    integrator: str = quantity("rk4", menu=tuple(methods()))
+    integrator: str = quantity("rk4", menu=_METHODS)
     """Method of time stepping."""
 
     precision: Literal["single", "double"] = quantity("single", menu=("single", "double"))

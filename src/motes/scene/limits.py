@@ -8,7 +8,7 @@ from typing import Any
 from motes.errors import Problem
 from motes.scene.lines import STRING
 
-SIZE = 1_000_000
+SIZE = 500_000
 """Bytes of a scene file."""
 
 DEPTH = 64
@@ -17,7 +17,10 @@ DEPTH = 64
 DIGITS = 400
 """Digits of a number; Python takes a time that grows with their square."""
 
-KEYS = 10_000
+MARKS = 60_000
+"""Brackets, commas, dots and equals signs: what makes a parser work."""
+
+KEYS = 5_000
 """Keys of a scene, all tables together."""
 
 _PART = re.compile(
@@ -25,33 +28,37 @@ _PART = re.compile(
     r"|(?P<run>[^\[\]{}\#\"']+)|(?P<other>.)",
     re.DOTALL,
 )
-_LONG_NUMBER = re.compile(rf"[0-9_]{{{DIGITS}}}")
+_LONG_NUMBER = re.compile(rf"(?<![0-9a-fA-F_xob])[0-9][0-9a-fA-F_xob]{{{DIGITS}}}")
 _BREAK = re.compile(r"[\n=,:]")
+_MARK = re.compile(r"[=,:.]")
 
 
 def excess(text: str) -> Problem | None:
     """What of a text is beyond the limits, before it is parsed."""
-    depth = dots = 0
+    depth = dots = marks = 0
     for match in _PART.finditer(text):
         kind, part = match.lastgroup, match[0]
+        fault = ""
         if kind == "mark":
+            marks += 1
             depth += 1 if part in "[{" else -1
+            if depth > DEPTH:
+                fault = f"more than {DEPTH} tables and lists are within each other"
         elif kind == "run":
+            marks += len(_MARK.findall(part))
             if _LONG_NUMBER.search(part):
-                return _beyond(text, match.start(), f"a number has more than {DIGITS} digits")
-            pieces = _BREAK.split(part)
-            longest = max(dots + pieces[0].count("."), *(p.count(".") for p in pieces[1:]), 0)
-            dots = pieces[-1].count(".") + (dots if len(pieces) == 1 else 0)
-            if longest >= DEPTH:
-                return _beyond(text, match.start(), f"a key has more than {DEPTH} names")
-        if depth > DEPTH:
-            message = f"more than {DEPTH} tables and lists are within each other"
-            return _beyond(text, match.start(), message)
+                fault = f"a number has more than {DIGITS} digits"
+            pieces = _BREAK.split(part) if marks <= MARKS else [""]
+            counts = [piece.count(".") for piece in pieces]
+            counts[0] += dots
+            dots = counts[-1]
+            if max(counts) >= DEPTH:
+                fault = f"a key has more than {DEPTH} names"
+        if marks > MARKS:
+            fault = "it holds more values than a scene may have"
+        if fault:
+            return Problem((), f"{fault}.", text.count("\n", 0, match.start()) + 1)
     return None
-
-
-def _beyond(text: str, at: int, message: str) -> Problem:
-    return Problem((), f"{message}.", text.count("\n", 0, at) + 1)
 
 
 def overgrown(document: dict[str, Any]) -> Problem | None:
@@ -64,10 +71,10 @@ def overgrown(document: dict[str, Any]) -> Problem | None:
             return Problem(path, f"more than {DEPTH} tables and lists are within each other.")
         if isinstance(value, dict):
             keys += len(value) + 1
+            if keys > KEYS:
+                return Problem((), f"it has more than {KEYS} keys and tables.")
             rest += [((*path, key), inner) for key, inner in value.items()]
         elif isinstance(value, list):
             inner = ((i, v) for i, v in enumerate(value) if isinstance(v, dict | list))
             rest += [((*path, i), v) for i, v in inner]
-    if keys > KEYS:
-        return Problem((), f"it has {keys} keys and tables; at most {KEYS} are allowed.")
     return None

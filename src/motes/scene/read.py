@@ -120,6 +120,12 @@ def _json(text: str, source: str) -> dict[str, Any]:
         lines, twice = json_lines(text)
         found = [Problem(p, f'the key "{p[-1]}" is here a second time.', lines[p]) for p in twice]
         raise SceneError(found, source) from None
+    if "\\u" in text:
+        try:
+            json.dumps(document, ensure_ascii=False).encode()
+        except UnicodeError:
+            message = "half of a surrogate pair, \\ud800 to \\udfff, is no character."
+            raise SceneError([Problem((), message)], source) from None
     if not isinstance(document, dict):
         message = 'a scene must be an object { "title": ..., "system": [...] }.'
         raise SceneError([Problem((), message, 1)], source)

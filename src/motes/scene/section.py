@@ -135,7 +135,7 @@ def collected(model: type[Section], values: Mapping[str, Any], source: str) -> I
 def _problem(details: Any, model: type[Section], values: Mapping[str, Any]) -> Problem:
     """One error of Pydantic in the words of motes."""
     path = details["loc"]
-    if details["type"] == "fault":
+    if details["type"] == "fault" or not path:
         return Problem(path, details["msg"])
     key = path[-1]
     owner, table = _owner(model, values, path[:-1] if isinstance(key, str) else path[:-2])
