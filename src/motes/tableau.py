@@ -1,17 +1,24 @@
 """Time-stepping methods as tables; a wrong table refuses to exist.
 
-Two families: Runge-Kutta methods (`Explicit`), given by a Butcher tableau, and splittings
-(`Splitting`), given by the lengths of their kicks (velocity changes) and drifts (position changes).
-One table drives fused loops over independent particles and staged ones over interacting particles.
+One table drives fused loops over independent particles, staged loops over interacting ones, and the
+solvers of `motes.ode`. Families: `Explicit` and `Implicit` Runge-Kutta methods, `Rosenbrock`
+methods, `Splitting` into kicks and drifts, `Nystrom` methods, and `BackwardDifference` formulas.
+Every table is checked against all order conditions of its order when it is made.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
+from motes import rooted_trees
+
 TOLERANCE = 1e-12
-"""How exactly a table must meet its order conditions; tables are written as double fractions."""
+"""How exactly a table must meet its order conditions, relative to the terms of their sums."""
+
+Numbers = tuple[float, ...]
 
 
 class TableauError(ValueError):
@@ -19,55 +26,175 @@ class TableauError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Explicit:
-    """Explicit Runge-Kutta method: k_i = f(t + c_i h, y + h sum_j a_ij k_j), y1 = y + h sum b_i k_i.
-
-    Raises TableauError when the table has not the declared order (Butcher's conditions, up to
-    order 4), when c_i is not the sum of row i, or when the embedded weights are not consistent.
-    """
+class _RungeKutta:
+    """What explicit and implicit Runge-Kutta methods share."""
 
     order: int
-    c: tuple[float, ...]
-    a: tuple[tuple[float, ...], ...]
-    b: tuple[float, ...]
-    b_low: tuple[float, ...] | None = None
+    c: Numbers
+    a: tuple[Numbers, ...]
+    b: Numbers
+    b_low: Numbers | None = None
     """Weights of the embedded method, for the error estimate."""
-    implicit: ClassVar[bool] = False
-    symplectic: ClassVar[bool] = False
+    low_order: int = 1
+    """Order of the embedded method."""
 
-    def __post_init__(self) -> None:
+    @property
+    def stages(self) -> int:
+        """Evaluations of the right-hand side in a step that stands alone."""
+        return len(self.b)
+
+    @property
+    def symplectic(self) -> bool:
+        """Whether b_i a_ij + b_j a_ji = b_i b_j: it keeps every quadratic invariant."""
+        a = [[*row, *[0.0] * (self.stages - len(row))] for row in self.a]
+        s, b = range(self.stages), self.b
+        return all(
+            abs(b[i] * a[i][j] + b[j] * a[j][i] - b[i] * b[j]) < TOLERANCE for i in s for j in s
+        )
+
+    def _check(self) -> None:
         s = len(self.b)
         if len(self.c) != s or len(self.a) != s:
             raise TableauError(f"{s} weights b need {s} rows a and {s} times c")
+        _check_sums(self.c, self.a)
+        weight = rooted_trees.weight(self.a)
+        _check_order("", self.order, self.b, weight)
+        if self.b_low is not None:
+            _check_order("embedded method: ", self.low_order, self.b_low, weight)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Explicit(_RungeKutta):
+    """Explicit Runge-Kutta method.
+
+    k_i = f(t + c_i h, y + h sum_j a_ij k_j), y1 = y + h sum b_i k_i.
+
+    Dense output. With D = y1 - y0, F1 = h k_0 - D, F2 = 2 D - h (k_0 + f(y1)), the step's
+    interpolant is y0 + s (D + (1 - s) (F1 + s (F2 + (1 - s) (F3 + s (F4 + ...))))), where
+    F_(3 + m) = h sum_i dense[m]_i k_i. Without rows it is the cubic through both ends; its weights
+    run over the stages, then f(y1), then the stages of `a_dense`, which only dense output needs.
+
+    Raises TableauError when the table has not the declared order (Butcher's conditions, all rooted
+    trees), when c_i is not the sum of row i, or when the embedded weights or the interpolant have
+    not the order that they should.
+    """
+
+    b_lower: Numbers | None = None
+    """A second embedded method, of still lower order, that keeps the estimate from vanishing."""
+    dense: tuple[Numbers, ...] = ()
+    """Rows F3, F4, ... of the interpolant."""
+    a_dense: tuple[Numbers, ...] = ()
+    c_dense: Numbers = ()
+    implicit: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
         for i, row in enumerate(self.a):
             if len(row) != i:
                 raise TableauError(f"row {i} of an explicit table has {i} numbers, not {len(row)}")
-            if abs(sum(row) - self.c[i]) > TOLERANCE:
-                raise TableauError(f"c[{i}] = {self.c[i]:g}, but row {i} of a adds up to {sum(row):g}")
-        _check("", self.order, self.conditions(self.b))
-        if self.b_low is not None:
-            _check("embedded method: ", 1, self.conditions(self.b_low))
+        self._check()
+        if self.interpolates:
+            self._check_dense()
 
-    def conditions(self, b: tuple[float, ...]) -> list[tuple[int, float, float]]:
-        """Butcher's order conditions: (order, value, what it must be), up to order 4.
+    @property
+    def first_same_as_last(self) -> bool:
+        """Whether the last stage is f at the end of the step, the next step's first."""
+        return self.stages > 1 and (*self.a[-1], 0.0) == tuple(self.b)
 
-        Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, table II.2.1.
-        """
-        c = self.c
-        s = range(len(b))
-        ac = [sum(a * c[j] for j, a in enumerate(row)) for row in self.a]
-        ac2 = [sum(a * c[j] ** 2 for j, a in enumerate(row)) for row in self.a]
-        aac = [sum(a * ac[j] for j, a in enumerate(row)) for row in self.a]
-        return [
-            (1, sum(b), 1),
-            (2, sum(b[i] * c[i] for i in s), 1 / 2),
-            (3, sum(b[i] * c[i] ** 2 for i in s), 1 / 3),
-            (3, sum(b[i] * ac[i] for i in s), 1 / 6),
-            (4, sum(b[i] * c[i] ** 3 for i in s), 1 / 4),
-            (4, sum(b[i] * c[i] * ac[i] for i in s), 1 / 8),
-            (4, sum(b[i] * ac2[i] for i in s), 1 / 12),
-            (4, sum(b[i] * aac[i] for i in s), 1 / 24),
-        ]
+    @property
+    def closed(self) -> tuple[Numbers, ...]:
+        """Rows of a, where the last, if it was not already there, leads to the end of the step."""
+        return self.a if self.first_same_as_last else (*self.a, self.b)
+
+    @property
+    def interpolates(self) -> bool:
+        """Whether the interpolant's error is of the method's order; else a partial step serves."""
+        return self.order <= 4 or bool(self.dense)
+
+    def interpolant(self, share: float) -> Numbers:
+        """Weights of the stages, of f(y1), and of `a_dense` in y(t + share h)."""
+        s, r = share, 1 - share
+        last = len(self.closed) - 1
+        total = len(self.closed) + len(self.a_dense)
+        result = [0.0] * total
+        ends = [*self.b, *[0.0] * (total - self.stages)]
+        start, end = [0.0] * total, [0.0] * total
+        start[0], end[last] = 1.0, 1.0
+        rows = [[x - d for x, d in zip(start, ends, strict=True)]]
+        rows.append([2 * d - x - y for d, x, y in zip(ends, start, end, strict=True)])
+        rows += [[*row, *[0.0] * (total - len(row))] for row in self.dense]
+        factor = s
+        for m, row in enumerate((ends, *rows)):
+            result = [x + factor * y for x, y in zip(result, row, strict=True)]
+            factor *= r if m % 2 == 0 else s
+        return tuple(result)
+
+    def _check_dense(self) -> None:
+        rows = (*self.closed, *self.a_dense)
+        _check_sums((*self.c, *([] if self.first_same_as_last else [1.0]), *self.c_dense), rows)
+        weight = rooted_trees.weight(rows)
+        for share in (0.25, 0.7):
+            b = self.interpolant(share)
+            what = f"interpolant at {share:g}: "
+            _check_order(what, max(1, self.order - 1), b, weight, share)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Implicit(_RungeKutta):
+    """Implicit Runge-Kutta method: a full matrix a, or a lower one, which is solved row by row.
+
+    Raises TableauError as `Explicit` does.
+    """
+
+    implicit: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        self._check()
+
+    @property
+    def diagonal(self) -> bool:
+        """Whether every stage stands for itself: no number above the diagonal."""
+        return all(x == 0 for i, row in enumerate(self.a) for x in row[i + 1 :])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rosenbrock:
+    """Linearly implicit Runge-Kutta method: one matrix 1 / (gamma h) - J, no iteration.
+
+    (1 / (gamma h) - J) u_i = f(t + c_i h, y + sum_j a_ij u_j) + sum_j d_ij u_j / h + h g_i df/dt,
+    y1 = y + sum b_i u_i. Hairer and Wanner, Solving Ordinary Differential Equations II, eq.
+    IV.7.25. Raises TableauError when the table has not the declared order.
+    """
+
+    order: int
+    gamma: float
+    c: Numbers
+    g: Numbers
+    a: tuple[Numbers, ...]
+    d: tuple[Numbers, ...]
+    b: Numbers
+    b_low: Numbers
+    low_order: int
+    implicit: ClassVar[bool] = True
+    symplectic: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        s = range(self.stages)
+        # From u back to k: Gamma is the inverse of 1/gamma - d, alpha = a Gamma, weights = b Gamma.
+        lower = [[0.0] * self.stages for _ in s]
+        for i in s:
+            lower[i][i] = self.gamma
+            for j in range(i):
+                inner = sum(self.d[i][m] * lower[m][j] for m in range(j, i))
+                lower[i][j] = self.gamma * inner
+        alpha = [_times(row, lower) for row in self.a]
+        _check_sums(self.c, alpha)
+        _check_sums(self.g, lower)
+        weight = rooted_trees.weight(
+            alpha,
+            [[x + y for x, y in zip(p, q, strict=True)] for p, q in zip(alpha, lower, strict=True)],
+        )
+        _check_order("", self.order, _times(self.b, lower), weight)
+        _check_order("embedded method: ", self.low_order, _times(self.b_low, lower), weight)
 
     @property
     def stages(self) -> int:
@@ -76,29 +203,55 @@ class Explicit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Splitting:
-    """Splitting of x' = v, v' = a(x, t): kicks d_i and drifts c_i in turn, kick first.
+class Nystrom:
+    """Runge-Kutta-Nystrom method for x'' = f(t, x).
 
-    `kicks` has one entry more than `drifts` (its last may be 0). A kick at time t + h sum(c so far)
-    changes v by h d_i a; a relaxation a = -k (v - u) is integrated exactly in it. Symplectic.
-    Raises TableauError when the coefficients have not the declared order (checked up to 2).
+    k_i = f(t + c_i h, x + c_i h v + h^2 sum_j a_ij k_j), x1 = x + h v + h^2 sum b_position_i k_i,
+    v1 = v + h sum b_i k_i. Raises TableauError when the table has not the declared order.
     """
 
     order: int
-    kicks: tuple[float, ...]
-    drifts: tuple[float, ...]
+    c: Numbers
+    a: tuple[Numbers, ...]
+    b: Numbers
+    b_position: Numbers
+    implicit: ClassVar[bool] = False
+    symplectic: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        weight = rooted_trees.nystrom_weight(self.c, self.a)
+        _check_nystrom(self.order, self.b, self.b_position, weight)
+
+    @property
+    def stages(self) -> int:
+        """Evaluations of the acceleration in a step."""
+        return len(self.b)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Splitting:
+    """Splitting of x' = v, v' = a(x, t): kicks d_i and drifts c_i in turn, kick first.
+
+    `kicks` has one entry more than `drifts` (the first or last may be 0). A kick at time
+    t + h sum(c so far) changes v by h d_i a; a relaxation a = -k (v - u) is integrated exactly in
+    it. Symplectic. Raises TableauError when the coefficients have not the declared order: as a
+    method for x'' = a(x), kick i lies at c_i = sum of drifts before it, and a_ij = d_j (c_i - c_j).
+    """
+
+    order: int
+    kicks: Numbers
+    drifts: Numbers
     implicit: ClassVar[bool] = False
     symplectic: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         if len(self.kicks) != len(self.drifts) + 1:
             raise TableauError("a splitting has one kick more than drifts; the last may be 0")
-        before, moment = 0.0, 0.0
-        for kick, drift in zip(self.kicks, (*self.drifts, 0.0), strict=True):
-            moment += kick * before
-            before += drift
-        conditions = [(1, sum(self.kicks), 1.0), (1, sum(self.drifts), 1.0), (2, moment, 1 / 2)]
-        _check("", self.order, conditions)
+        c, d = self.times, self.kicks
+        _check("drifts: ", 1, 1, self.drifts, [1.0] * len(self.drifts), 1.0)
+        a = [[d[j] * (c[i] - c[j]) for j in range(i)] for i in range(len(d))]
+        positions = [kick * (1 - time) for kick, time in zip(d, c, strict=True)]
+        _check_nystrom(self.order, d, positions, rooted_trees.nystrom_weight(c, a))
 
     @property
     def stages(self) -> int:
@@ -106,7 +259,7 @@ class Splitting:
         return sum(kick != 0 for kick in self.kicks)
 
     @property
-    def times(self) -> tuple[float, ...]:
+    def times(self) -> Numbers:
         """Time of every kick, as a share of the step."""
         result = [0.0]
         for drift in self.drifts:
@@ -114,13 +267,80 @@ class Splitting:
         return tuple(result)
 
 
+@dataclass(frozen=True, kw_only=True)
+class BackwardDifference:
+    """Backward differentiation formula: sum_j a_j y_(n+1-j) = h f(t_(n+1), y_(n+1)), constant step.
+
+    Raises TableauError when the formula is not exact for polynomials up to its order.
+    """
+
+    order: int
+    a: Numbers
+    implicit: ClassVar[bool] = True
+    symplectic: ClassVar[bool] = False
+    stages: ClassVar[int] = 1
+
+    def __post_init__(self) -> None:
+        for m in range(self.order + 1):
+            powers = [float((-j) ** m) for j in range(len(self.a))]
+            _check("", self.order, m, self.a, powers, float(m == 1))
+
+
 Method = Explicit | Splitting
+"""Tables that scenes can be compiled with."""
+
+Table = Method | Implicit | Rosenbrock | Nystrom | BackwardDifference
+"""All tables, for `motes.ode`."""
 
 
-def _check(what: str, declared: int, conditions: list[tuple[int, float, float]]) -> None:
-    for order, value, target in conditions:
-        if order <= declared and abs(value - target) > TOLERANCE:
-            raise TableauError(
-                f"{what}declared order {declared}, but an order-{order} condition gives "
-                f"{value:.6g} instead of {target:.6g}"
-            )
+def composed(order: int, weights: Sequence[float]) -> Splitting:
+    """Symmetric composition of leapfrogs of lengths w_1 ... w_m, w_0, w_m ... w_1, w_0 the rest.
+
+    Drift first: each leapfrog is half a drift, a kick, half a drift, and neighbours join.
+    """
+    lengths = [*weights, 1 - 2 * sum(weights), *reversed(weights)]
+    halves = [length / 2 for length in lengths]
+    drifts = [halves[0], *(x + y for x, y in pairwise(halves)), halves[-1]]
+    return Splitting(order=order, kicks=(0, *lengths, 0), drifts=tuple(drifts))
+
+
+def _times(row: Sequence[float], matrix: Sequence[Sequence[float]]) -> list[float]:
+    """A row, which may be short of trailing zeros, times a square matrix."""
+    return [sum(x * matrix[m][j] for m, x in enumerate(row)) for j in range(len(matrix))]
+
+
+def _check_sums(c: Numbers, a: Sequence[Sequence[float]]) -> None:
+    for i, (time, row) in enumerate(zip(c, a, strict=True)):
+        if abs(sum(row) - time) > TOLERANCE:
+            raise TableauError(f"c[{i}] = {time:g}, but row {i} of a adds up to {sum(row):g}")
+
+
+def _check_order(
+    what: str, order: int, b: Sequence[float], weight: rooted_trees.Weight, share: float = 1.0
+) -> None:
+    """Butcher's conditions at a share of the step: sum b_i phi_i(t) = share^|t| / density(t)."""
+    for tree in rooted_trees.up_to(order):
+        n, density = rooted_trees.vertices(tree), rooted_trees.density(tree)
+        _check(what, order, n, b, weight(tree), share**n / density)
+
+
+def _check_nystrom(
+    order: int, b: Sequence[float], b_position: Sequence[float], weight: rooted_trees.Weight
+) -> None:
+    for tree in filter(rooted_trees.special, rooted_trees.up_to(order)):
+        n, density = rooted_trees.vertices(tree), rooted_trees.density(tree)
+        _check("velocity: ", order, n, b, weight(tree), 1 / density)
+        _check("position: ", order, n + 1, b_position, weight(tree), 1 / ((n + 1) * density))
+
+
+def _check(
+    what: str, declared: int, order: int, b: Sequence[float], phi: Sequence[float], target: float
+) -> None:
+    """One condition: sum b_i phi_i is the target, but for the rounding of its terms."""
+    terms = [x * y for x, y in zip(b, phi, strict=True)]
+    value, size = sum(terms), max(1.0, *map(abs, terms))
+    if order <= declared and abs(value - target) > TOLERANCE * size:
+        raise TableauError(
+            f"{what}declared order {declared}, but an order-{order} condition gives "
+            f"{value:.6g} instead of {target:.6g}"
+        )

@@ -7,19 +7,35 @@ import pkgutil
 from functools import cache
 
 from motes.errors import SceneError, likely
-from motes.tableau import Method
+from motes.tableau import Method, Table
 
 
 @cache
-def methods() -> dict[str, Method]:
+def names() -> tuple[str, ...]:
+    """Names of all methods, in alphabetical order."""
+    return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if m.name[0] != "_"))
+
+
+def methods() -> dict[str, Table]:
     """All methods by name, in alphabetical order."""
-    names = sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
-    return {name: importlib.import_module(f"{__name__}.{name}").method for name in names}
+    return {name: table(name) for name in names()}
+
+
+def table(name: str) -> Table:
+    """A method by name. Raises SceneError with the menu."""
+    if name not in names():
+        menu = ", ".join(names())
+        raise SceneError(f'no integrator "{name}".{likely(name, names())} There are: {menu}.')
+    found: Table = importlib.import_module(f"{__name__}.{name}").method
+    return found
 
 
 def method(name: str) -> Method:
-    """A method by name. Raises SceneError with the menu."""
-    if name not in methods():
-        menu = ", ".join(methods())
-        raise SceneError(f'no integrator "{name}".{likely(name, methods())} There are: {menu}.')
-    return methods()[name]
+    """A method that a scene can use. Raises SceneError with the menu."""
+    found = table(name)
+    if not isinstance(found, Method):
+        menu = ", ".join(n for n, m in methods().items() if isinstance(m, Method))
+        raise SceneError(
+            f'integrator "{name}" works in motes.ode, but not in a scene. Scenes take {menu}.'
+        )
+    return found
