@@ -48,6 +48,11 @@ def _values(control: Control, view: View) -> NDArray[Any]:
         place = view.age / view.life
     else:
         place = np.sqrt((view.velocity.astype(float) ** 2).sum(axis=1))
+    return interpolated(control, place)
+
+
+def interpolated(control: Curve, place: NDArray[Any]) -> NDArray[np.float32]:
+    """Values (n, width) of a curve over life or speed, from the table that kernels read too."""
     low, high = control.span
     table = control.table().astype(np.float32)
     u = np.clip((place - low) / max(high - low, 1e-30), 0, 1) * (TABLE_SIZE - 1)

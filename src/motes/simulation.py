@@ -132,11 +132,12 @@ class Simulation:
         until: float | None = None,
         steps: int | None = None,
         progress: Callable[[Simulation], None] | None = None,
+        checked: bool = True,
     ) -> None:
         """Run for a number of steps, or to the last step that does not go beyond a time [s].
 
         `progress` is called after every step. Raises SimulationError when a particle became
-        infinite, with the likely cause.
+        infinite, with the likely cause, unless the result is not to be `checked`.
         """
         if (until is None) == (steps is None):
             raise ValueError("run takes either steps or until, such as run(until=2.0)")
@@ -148,7 +149,8 @@ class Simulation:
         if steps < 0:
             raise ValueError(f"steps must be at least 0, not {steps}")
         self._run(steps, progress)
-        self.check()
+        if checked:
+            self.check()
 
     def _run(self, steps: int, progress: Callable[[Simulation], None] | None) -> None:
         for _ in range(steps):
@@ -218,9 +220,11 @@ class Simulation:
         for name, particles in self._state.systems.items():
             row = _first_not_finite(particles)
             if row is not None:
-                raise SimulationError(
-                    explain_infinity(particles, row, self._steppers[name].system, self.time)
-                )
+                raise SimulationError(explain_infinity(self, name, row))
+
+    def forces(self, system: str) -> tuple[tuple[str, Component], ...]:
+        """Addresses and components of the forces that act on a system, in the order of their sum."""
+        return self._steppers[system].system.motion.forces
 
 
 def _first_not_finite(particles: Particles) -> int | None:

@@ -35,9 +35,7 @@ class Studio:
         self.scene = scene
         film = scene.film
         width, height = size or film.size
-        self._film = Film(
-            size=(int(width), int(height)), tone=film.tone, bloom=float(film.bloom)
-        )
+        self._film = Film(size=(int(width), int(height)), tone=film.tone, bloom=float(film.bloom))
         self._renderers: dict[float, Renderer] = {}
         self._shutter = float(film.shutter) / float(film.fps)
 

@@ -11,7 +11,9 @@ import motes
 def simulation(emit: list, **scene: object) -> motes.Simulation:
     system = {k: scene.pop(k) for k in ("life", "size", "color", "mass", "capacity") if k in scene}
     settings = {"precision": "double", "step": 0.01, "duration": 10.0, **scene}
-    return motes.Simulation(motes.Scene(systems=[motes.System("s", emit=emit, **system)], **settings))
+    return motes.Simulation(
+        motes.Scene(systems=[motes.System("s", emit=emit, **system)], **settings)
+    )
 
 
 def test_the_kth_birth_happens_when_the_integral_of_the_rate_reaches_k() -> None:
@@ -125,7 +127,9 @@ def test_shapes_are_filled_evenly(shape: str) -> None:
 
 def test_the_axis_of_an_emitter_turns_with_its_direction() -> None:
     for direction in ((1, 0, 0), (0, 1, 0), (0, 0, -1), (0, -1, 0), (1, 2, -2)):
-        emitter = motes.emit.Disc(burst=[{"count": 500}], radius=1.0, speed=3.0, direction=direction)
+        emitter = motes.emit.Disc(
+            burst=[{"count": 500}], radius=1.0, speed=3.0, direction=direction
+        )
         sim = simulation([emitter])
         sim.run(steps=1)
         n = np.array(direction) / np.linalg.norm(direction)
@@ -139,7 +143,9 @@ def draws(scene: motes.Scene) -> dict[int, tuple]:
     sim = motes.Simulation(scene)
     sim.run(until=0.5)
     s = sim["s"]
-    return {int(i): (b, *v, m) for i, b, v, m in zip(s.id, s.birth, s.velocity, s.mass, strict=True)}
+    return {
+        int(i): (b, *v, m) for i, b, v, m in zip(s.id, s.birth, s.velocity, s.mass, strict=True)
+    }
 
 
 def test_removing_an_emitter_changes_no_other_particle() -> None:

@@ -50,9 +50,7 @@ def test_error_falls_with_the_methods_order(integrator: str, order: int) -> None
     ]
 
     def end(step: float, method: str = integrator) -> np.ndarray:
-        sim = one_particle(
-            velocity=(0.5, 0.2, 1.0), force=forces, integrator=method, step=step
-        )
+        sim = one_particle(velocity=(0.5, 0.2, 1.0), force=forces, integrator=method, step=step)
         sim.run(until=1.0)
         return sim["ball"].position[0].copy()
 
@@ -66,7 +64,10 @@ def test_euler_leaves_the_circle_by_its_exact_factor() -> None:
     """On x' = (-y, x) Euler multiplies the radius by sqrt(1 + h^2) every step."""
     step, n = 0.05, 100
     sim = one_particle(
-        position=(1.0, 0.0, 0.0), flow=[motes.flow.Rotation(rate=1.0)], integrator="euler", step=step
+        position=(1.0, 0.0, 0.0),
+        flow=[motes.flow.Rotation(rate=1.0)],
+        integrator="euler",
+        step=step,
     )
     sim.run(steps=n)
     radius = np.linalg.norm(sim["ball"].position[0, :2])
@@ -180,9 +181,7 @@ def test_drag_decays_exactly_in_a_splitting() -> None:
 
 def test_terminal_speed_of_quadratic_drag() -> None:
     """k v^2 = m g."""
-    sim = one_particle(
-        force=[motes.force.Gravity(), motes.force.QuadraticDrag(k=0.3)], step=0.01
-    )
+    sim = one_particle(force=[motes.force.Gravity(), motes.force.QuadraticDrag(k=0.3)], step=0.01)
     sim.run(until=5.0)
     assert -sim["ball"].velocity[0, 2] == pytest.approx(math.sqrt(G / 0.3), rel=1e-6)
 
