@@ -9,8 +9,9 @@ from typing import Any
 
 from motes.catalog import KINDS, Component, catalog, find, kinds
 from motes.errors import SceneError, likely
-from motes.integrate import method, methods
+from motes.integrate import method, scene_methods
 from motes.parameter import Parameter
+from motes.tableau import Method
 
 DOCUMENT = "document"
 """Kind of the tables that a scene itself has."""
@@ -53,7 +54,7 @@ class Entry:
     text: str
     parameters: tuple[Field, ...]
     example: str
-    """How a scene names it, in TOML."""
+    """How a scene names it, in TOML; empty for what no scene can use."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def describe_kind(kind: str) -> Group:
     if kind == DOCUMENT:
         text, names = "The tables of a scene.", list(TABLES)
     elif kind == "integrate":
-        text, names = _text(importlib.import_module("motes.integrate")), list(methods())
+        text, names = _text(importlib.import_module("motes.integrate")), list(scene_methods())
     else:
         _known(kind)
         text, names = _text(importlib.import_module(f"motes.{kind}")), list(catalog(kind))
@@ -97,9 +98,10 @@ def describe_entry(kind: str, name: str) -> Entry:
     if kind == DOCUMENT:
         return _table(name)
     if kind == "integrate":
-        method(name)
+        in_scenes = isinstance(integrator(name), Method)
         text = _text(importlib.import_module(f"motes.integrate.{name}"))
-        return Entry(kind, name, _summary(text), text, (), f'integrator = "{name}"')
+        example = f'integrator = "{name}"' if in_scenes else ""
+        return Entry(kind, name, _summary(text), text, (), example)
     _known(kind)
     entry = find(kind, name)
     text = _text(entry)

@@ -21,6 +21,11 @@ def methods() -> dict[str, Table]:
     return {name: table(name) for name in names()}
 
 
+def scene_methods() -> dict[str, Method]:
+    """The methods that a scene can use, by name, in alphabetical order."""
+    return {name: found for name, found in methods().items() if isinstance(found, Method)}
+
+
 def table(name: str) -> Table:
     """A method by name. Raises SceneError with the menu."""
     if name not in names():
@@ -34,7 +39,7 @@ def method(name: str) -> Method:
     """A method that a scene can use. Raises SceneError with the menu."""
     found = table(name)
     if not isinstance(found, Method):
-        menu = ", ".join(n for n, m in methods().items() if isinstance(m, Method))
+        menu = ", ".join(scene_methods())
         raise SceneError(
             f'integrator "{name}" works in motes.ode, but not in a scene. Scenes take {menu}.'
         )
