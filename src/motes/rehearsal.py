@@ -12,9 +12,10 @@ import os
 import subprocess
 import sys
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motes.frame import Frame
 
@@ -78,7 +79,7 @@ class Rehearsal:
 def frame_of(scene: Scene) -> Frame:
     """A frame with one particle in each system, where the camera looks."""
     place = np.array([scene.camera.values["look_at"].at(0.0)[:3]], np.float32)
-    columns = {
+    columns: dict[str, NDArray[Any]] = {
         "position": place,
         "velocity": np.ones((1, 3), np.float32),
         "color": np.ones((1, 4), np.float32),

@@ -15,6 +15,6 @@ def command() -> None:
     motes schema > scene.schema.json
     Then begin a scene with the line: #:schema scene.schema.json
     """
-    import motes
+    from motes.scene.schema import schema
 
-    click.echo(json.dumps(motes.schema(), indent=2, ensure_ascii=False))
+    click.echo(json.dumps(schema(), indent=2, ensure_ascii=False))
