@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from motes.frame import Frame
     from motes.jit import threads
     from motes.production import film, redraw
-    from motes.scene import Camera, Film, Scene, Sky, System, load, schema
+    from motes.scene import Camera, Film, Scene, Sky, System, load
     from motes.simulation import Simulation
     from motes.studio import Studio
     from motes.studio import picture as render
@@ -67,7 +67,6 @@ __all__ = [
     "redraw",
     "render",
     "retire",
-    "schema",
     "solid",
     "threads",
 ]
@@ -96,7 +95,6 @@ _HOMES = {
     "Sky": "scene",
     "System": "scene",
     "load": "scene",
-    "schema": "scene",
     "Simulation": "simulation",
     "Studio": "studio",
     "render": "studio:picture",

@@ -58,4 +58,5 @@ def interpolated(control: Curve, place: NDArray[Any]) -> NDArray[np.float32]:
     u = np.clip((place - low) / max(high - low, 1e-30), 0, 1) * (TABLE_SIZE - 1)
     left = np.minimum(u.astype(np.int32), TABLE_SIZE - 2)
     weight = (u - left).astype(np.float32)[:, None]
-    return table[left] + weight * (table[left + 1] - table[left])
+    values: NDArray[np.float32] = table[left] + weight * (table[left + 1] - table[left])
+    return values

@@ -1,4 +1,4 @@
-"""Why a particle became infinite: the step in which it happened, and the force that pushed hardest."""
+"""Why a particle became infinite: in which step, and the force that pushed hardest."""
 
 from __future__ import annotations
 

@@ -39,7 +39,8 @@ def allocate(shape: tuple[int, ...], dtype: DTypeLike, what: str) -> NDArray[Any
     try:
         return np.zeros(shape, dtype)
     except MemoryError:
-        raise MemoryBudgetError(f"{what} would need {_shown(size)}; the system has no more.") from None
+        message = f"{what} would need {_shown(size)}; the system has no more."
+        raise MemoryBudgetError(message) from None
 
 
 def _shown(size: int) -> str:

@@ -223,7 +223,7 @@ class Simulation:
                 raise SimulationError(explain_infinity(self, name, row))
 
     def forces(self, system: str) -> tuple[tuple[str, Component], ...]:
-        """Addresses and components of the forces that act on a system, in the order of their sum."""
+        """Addresses and components of the forces on a system, in the order of their sum."""
         return self._steppers[system].system.motion.forces
 
 

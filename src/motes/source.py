@@ -1,4 +1,4 @@
-"""Reading a component's own source text: parameter help, kernels to rewrite, what a digest covers."""
+"""A component's own source text: parameter help, kernels to rewrite, what a digest covers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import inspect
 import linecache
 import textwrap
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
+from itertools import pairwise
 from types import FunctionType
 from typing import Any
 
@@ -25,10 +27,8 @@ def _class_node(cls: type) -> tuple[ast.ClassDef, str] | None:
     """
     functions = [f for f in vars(cls).values() if isinstance(f, FunctionType)]
     names = [f.__code__.co_filename for f in functions]
-    try:
+    with suppress(OSError, TypeError):  # A class of a notebook cell has no file.
         names.append(inspect.getfile(cls))
-    except (OSError, TypeError):
-        pass  # A class without functions in a notebook cell has no help text, and needs none.
     for name in names:
         text = "".join(linecache.getlines(name))
         try:
@@ -50,7 +50,7 @@ def attribute_docs(cls: type) -> dict[str, str]:
     if located is None:
         return docs
     body = located[0].body
-    for statement, after in zip(body, body[1:], strict=False):
+    for statement, after in pairwise(body):
         if (
             isinstance(statement, ast.AnnAssign)
             and isinstance(statement.target, ast.Name)

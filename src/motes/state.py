@@ -47,7 +47,7 @@ class Particles:
     @property
     def capacity(self) -> int:
         """Rows that fit before the arrays must grow."""
-        return self.position.shape[1]
+        return int(self.position.shape[1])
 
     def _allocate(self, rows: int) -> None:
         what = f'system "{self.name}" with {rows} rows'

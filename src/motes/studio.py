@@ -93,7 +93,7 @@ class Studio:
             velocity=columns["velocity"],
             color=columns["color"],
             size=columns["size"],
-            kind=type(look).drawn_as,
+            kind=vars(type(look))["drawn_as"],
             emission=_one(look.values["emission"], time),
             opacity=_one(look.values["opacity"], time),
             softness=_one(look.values["softness"], time),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ class Control(ABC):
     for each particle) or "particle" (changes during its life). `width` is the count of components.
     """
 
-    scope: ClassVar[str] | str
+    scope: str
     width: int
 
     @abstractmethod

@@ -1,8 +1,8 @@
 """Where and how particles are born: shapes, each a file.
 
-A shape's `birth(p, u, t, k)` turns uniform numbers `u` in [0, 1) into one newborn's position [m] and
-velocity [m/s] in the emitter's own frame, in which its axis is +z. Rate, bursts, birth instants,
-pose and storage are written once, in the engine.
+A shape's `birth(p, u, t, k)` turns uniform numbers `u` in [0, 1) into one newborn's position [m]
+and velocity [m/s] in the emitter's own frame, in which its axis is +z. Rate, bursts, birth
+instants, pose and storage are written once, in the engine.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ from motes.noise import noise
 
 @component
 class Wind:
-    """Air that carries particles along: a = -(grip / mass) (v - u), with u = velocity (1 + gusts n).
+    """Air that carries particles along: a = -(grip / mass) (v - u),
+    u = velocity (1 + gusts n).
 
     n(x, t) is smooth noise of mean 0 and rms 1 that drifts with the wind.
     """
