@@ -11,7 +11,6 @@ from motes.catalog import KINDS, Component, catalog, find, kinds
 from motes.errors import SceneError, likely
 from motes.integrate import method, scene_methods
 from motes.parameter import Parameter
-from motes.tableau import Method
 
 DOCUMENT = "document"
 """Kind of the tables that a scene itself has."""
@@ -54,7 +53,7 @@ class Entry:
     text: str
     parameters: tuple[Field, ...]
     example: str
-    """How a scene names it, in TOML; empty for what no scene can use."""
+    """How a scene names it, in TOML."""
 
 
 @dataclass(frozen=True)
@@ -98,10 +97,9 @@ def describe_entry(kind: str, name: str) -> Entry:
     if kind == DOCUMENT:
         return _table(name)
     if kind == "integrate":
-        in_scenes = isinstance(integrator(name), Method)
+        method(name)
         text = _text(importlib.import_module(f"motes.integrate.{name}"))
-        example = f'integrator = "{name}"' if in_scenes else ""
-        return Entry(kind, name, _summary(text), text, (), example)
+        return Entry(kind, name, _summary(text), text, (), f'integrator = "{name}"')
     _known(kind)
     entry = find(kind, name)
     text = _text(entry)
