@@ -224,7 +224,7 @@ def test_a_run_that_ends_early_says_how_to_go_on(
     FrameStore.create(tmp_path / "frames", MANIFEST).write(jet())
     studio.error = error
     outcome("run", "jet", "-o", str(tmp_path))
-    assert f"1 finished frames are kept; `motes render {tmp_path}`" in capsys.readouterr().err
+    assert f"Finished frames kept: 1. `motes render {tmp_path}`" in capsys.readouterr().err
 
 
 def test_info_shows_kept_frames(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

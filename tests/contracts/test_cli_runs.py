@@ -138,7 +138,7 @@ def test_a_stopped_run_keeps_whole_frames_that_make_a_film(
     assert out == ""
     if ending == signal.SIGINT:
         assert process.returncode == 130
-        assert "finished frames are kept; `motes render out` makes a film of them.\n" in err
+        assert "`motes render out` makes a film of them.\n" in err
         assert err.endswith("\nStopped.\n")
     store = open_frames(tmp_path / "out")
     count = len(store.numbers())

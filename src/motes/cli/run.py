@@ -89,6 +89,5 @@ def _tell_kept(folder: Path) -> None:
         kept = 0
     if kept:
         click.echo(
-            f"{kept} finished frames are kept; `motes render {folder}` makes a film of them.",
-            err=True,
+            f"Finished frames kept: {kept}. `motes render {folder}` makes a film of them.", err=True
         )
