@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar, dataclass_transform
 
-from motes.errors import Problem, SceneError, likely
+from motes.errors import Problem, SceneError, likely, path_of
 from motes.parameter import Color, Flag, Integer, Number, Parameter, Vector, quantity
 from motes.source import attribute_docs, class_source
 
@@ -101,7 +101,7 @@ class Component:
                 checked[key] = parameter.control(values.get(key, parameter.default))
             except ValueError as fault:
                 where = f'{cls.kind.noun} "{cls.type}"'
-                problems.append(Problem((key,), f"{where}: {fault}"))
+                problems.append(Problem((key, *path_of(fault)), f"{where}: {fault}"))
         return checked, problems
 
     @classmethod

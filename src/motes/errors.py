@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 LONGEST_WORD = 64
@@ -42,6 +43,28 @@ class MemoryBudgetError(MotesError, MemoryError):
     """An array would not fit into the memory budget; nothing was allocated."""
 
     exit_code = 75
+
+
+class ValueFault(ValueError):
+    """A value is wrong in one line; `path` leads to the place within it, where it has parts."""
+
+    def __init__(self, message: str, path: tuple[str | int, ...] = ()) -> None:
+        super().__init__(message)
+        self.path = path
+
+
+@contextmanager
+def within(*path: str | int) -> Iterator[None]:
+    """Add where in a value the block is to any ValueError that it raises."""
+    try:
+        yield
+    except ValueError as fault:
+        raise ValueFault(str(fault), (*path, *path_of(fault))) from None
+
+
+def path_of(fault: ValueError) -> tuple[str | int, ...]:
+    """Where in a value a fault is, as far as it is known."""
+    return fault.path if isinstance(fault, ValueFault) else ()
 
 
 @dataclass(frozen=True)

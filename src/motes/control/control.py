@@ -34,10 +34,14 @@ class Control(ABC):
         raise TypeError(f"a control of scope {self.scope} has no value of its own at a time")
 
     def __eq__(self, other: object) -> bool:
-        return type(self) is type(other) and repr(self) == repr(other)
+        return (
+            type(self) is type(other)
+            and isinstance(other, Control)
+            and self.document() == other.document()
+        )
 
     def __hash__(self) -> int:
-        return hash(repr(self))
+        return hash((type(self), self.width))
 
     def __repr__(self) -> str:
         return repr(self.document())

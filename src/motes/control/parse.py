@@ -16,7 +16,7 @@ from motes.control.control import Control, Values
 from motes.control.curve import SCOPE_OF, Curve
 from motes.control.draw import Choice, Normal, Uniform
 from motes.control.spline import Spline
-from motes.errors import likely
+from motes.errors import ValueFault, likely, within
 from motes.parameter import SCOPES, Parameter
 
 INTERPOLATIONS = ("linear", "smooth", "monotone", "constant", "bezier")
@@ -73,7 +73,7 @@ def _tidy(value: Any) -> Any:
         return {str(k): _tidy(v) for k, v in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    if isinstance(value, Sequence) and not isinstance(value, str):
+    if _is_list(value):
         return [_tidy(v) for v in value]
     return value
 
@@ -173,7 +173,7 @@ def _setting(value: Any, parameter: Parameter) -> Any:
 
         return TABLES[parameter.table](_tidy(value), name)
     if parameter.shape == "pair":
-        if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
+        if not _is_list(value) or len(value) != 2:
             raise ValueError(f"{name} must be two whole numbers, not {_shown(value)}.")
         return tuple(_whole(v, parameter) for v in value)
     if parameter.shape == "integer":
@@ -199,33 +199,46 @@ def _varying(value: Mapping[str, Any], parameter: Parameter) -> Control:
 def _only(value: Mapping[str, Any], keys: Sequence[str], name: str) -> None:
     for key in value:
         if key not in keys:
-            raise ValueError(
-                f'{name} has no key "{key}".{likely(str(key), keys)} It takes {", ".join(keys)}.'
-            )
+            hint = f"{likely(str(key), keys)} It takes {', '.join(keys)}."
+            raise ValueFault(f'{name} has no key "{key}".{hint}', (key,))
 
 
 def _mean_spread(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Control:
     _only(value, ("mean", "spread"), parameter.name)
-    mean = _plain(value["mean"], parameter)
-    spread = value.get("spread", 0.0)
-    if isinstance(spread, Sequence) and not isinstance(spread, str):
-        width = np.array([_number(s, f"{parameter.name}.spread") for s in spread])
-        if parameter.shape == "color" and width.size == 3:
-            width = np.append(width, 0.0)
-        if width.size != mean.size:
-            raise ValueError(f"{parameter.name}.spread must have {mean.size} numbers.")
+    with within("mean"):
+        mean = _plain(value["mean"], parameter)
+    with within("spread"):
+        spread = _spread(value.get("spread", 0.0), parameter)
+    return Uniform(mean - spread, mean + spread, document)
+
+
+def _spread(value: Any, parameter: Parameter) -> Values:
+    """Half the width of an interval: one number for all components, or one for each.
+
+    One number for a colour leaves its alpha as it is.
+    """
+    name, count = f"{parameter.name}.spread", parameter.width
+    if _is_list(value):
+        spread = [_number(v, name) for v in value]
+        if parameter.shape == "color" and len(spread) == 3:
+            spread.append(0.0)
     else:
-        width = np.full(mean.size, _number(spread, f"{parameter.name}.spread"))
+        spread = [_number(value, name)] * count
         if parameter.shape == "color":
-            width[3] = 0.0
-    if (width < 0).any():
-        raise ValueError(f"{parameter.name}.spread must be at least 0.")
-    return Uniform(mean - width, mean + width, document)
+            spread[3] = 0.0
+    if len(spread) != count:
+        raise ValueError(f"{name} must have {count} numbers.")
+    if min(spread) < 0:
+        raise ValueError(f"{name} must be at least 0.")
+    return np.array(spread)
 
 
 def _low_high(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Control:
     _only(value, ("low", "high"), parameter.name)
-    low, high = _plain(value["low"], parameter), _plain(value["high"], parameter)
+    with within("low"):
+        low = _plain(value["low"], parameter)
+    with within("high"):
+        high = _plain(value["high"], parameter)
     if (low > high).any():
         raise ValueError(f"{parameter.name}: low is above high.")
     return Uniform(low, high, document)
@@ -234,12 +247,13 @@ def _low_high(value: Mapping[str, Any], parameter: Parameter, document: Any) -> 
 def _normal(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Control:
     _only(value, ("normal",), parameter.name)
     pair = value["normal"]
-    if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
-        raise ValueError(f"{parameter.name}: normal must be [mean, sigma], not {_shown(pair)}.")
-    mean = _plain(pair[0], parameter)
-    sigma = np.full(mean.size, _number(pair[1], f"{parameter.name}: sigma"))
-    if (sigma < 0).any():
-        raise ValueError(f"{parameter.name}: sigma must be at least 0.")
+    with within("normal"):
+        if not _is_list(pair) or len(pair) != 2:
+            raise ValueError(f"{parameter.name}: normal must be [mean, sigma], not {_shown(pair)}.")
+        mean = _plain(pair[0], parameter)
+        sigma = np.full(mean.size, _number(pair[1], f"{parameter.name}: sigma"))
+        if (sigma < 0).any():
+            raise ValueError(f"{parameter.name}: sigma must be at least 0.")
     if parameter.shape == "color":
         sigma[3] = 0.0
     return Normal(mean, sigma, document)
@@ -247,49 +261,39 @@ def _normal(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Co
 
 def _choice(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Control:
     _only(value, ("choice",), parameter.name)
-    menu = value["choice"]
-    if not isinstance(menu, Sequence) or isinstance(menu, str) or not menu:
+    menu, values = value["choice"], []
+    if not _is_list(menu) or not menu:
         raise ValueError(f"{parameter.name}: choice must be a list of values, not {_shown(menu)}.")
-    return Choice(np.array([_plain(v, parameter) for v in menu]), document)
+    for i, entry in enumerate(menu):
+        with within("choice", i):
+            values.append(_plain(entry, parameter))
+    return Choice(np.array(values), document)
 
 
 def _curve(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Control:
     name = parameter.name
-    keys_name = "stops" if "stops" in value else "keys"
-    _only(value, ("over", keys_name, "interpolation", "before", "after"), name)
-    over = value["over"]
-    if not isinstance(over, str) or over not in SCOPE_OF:
-        raise ValueError(
-            f"{name}: over must be one of {', '.join(SCOPE_OF)}, not {_shown(over)}."
-            + likely(str(over), SCOPE_OF)
-        )
-    words = {"interpolation": INTERPOLATIONS, "before": EXTRAPOLATIONS, "after": EXTRAPOLATIONS}
+    words = {
+        "over": tuple(SCOPE_OF),
+        "interpolation": INTERPOLATIONS,
+        "before": EXTRAPOLATIONS,
+        "after": EXTRAPOLATIONS,
+    }
+    rows = "stops" if "stops" in value else "keys"
+    _only(value, (*words, rows), name)
     options = {}
     for word, menu in words.items():
+        if word in value and value[word] not in menu:
+            hint = likely(str(value[word]), menu)
+            shown = f"{', '.join(menu)}, not {_shown(value[word])}."
+            raise ValueFault(f"{name}: {word} must be one of {shown}{hint}", (word,))
         if word in value:
-            if value[word] not in menu:
-                raise ValueError(
-                    f"{name}: {word} must be one of {', '.join(menu)}, not {_shown(value[word])}."
-                    + likely(str(value[word]), menu)
-                )
             options[word] = value[word]
-    rows = value[keys_name]
-    if not isinstance(rows, Sequence) or isinstance(rows, str) or not rows:
-        raise ValueError(f"{name}: {keys_name} must be a list [[{over}, value], ...].")
-    times, values, handles = [], [], []
-    for row in rows:
-        if not isinstance(row, Sequence) or isinstance(row, str) or len(row) not in (2, 4):
-            raise ValueError(f"{name}: a key must be [{over}, value], not {_shown(row)}.")
-        times.append(_number(row[0], f"{name}: {over}"))
-        values.append(_plain(row[1], parameter))
-        if len(row) == 4:
-            handles.append([_handle(h, name) for h in row[2:]])
+    over = options.pop("over")
+    times, values, handles = _keys(value[rows], over, rows, parameter)
     if handles and (options.get("interpolation") != "bezier" or len(handles) != len(times)):
         raise ValueError(
             f'{name}: keys with handles need interpolation = "bezier", and every key its two.'
         )
-    if over in ("life", "random") and (min(times) < 0 or max(times) > 1):
-        raise ValueError(f"{name}: keys over {over} run from 0 to 1, not to {_shown(max(times))}.")
     try:
         spline = Spline(
             np.array(times),
@@ -298,12 +302,38 @@ def _curve(value: Mapping[str, Any], parameter: Parameter, document: Any) -> Con
             **options,
         )
     except ValueError as fault:
-        raise ValueError(f"{name}: {fault}") from None
+        raise ValueError(f"{name}: {fault}.") from None
     return Curve(over, spline, parameter.width, document)
 
 
+def _keys(
+    rows: Any, over: str, word: str, parameter: Parameter
+) -> tuple[list[float], list[Values], list[list[list[float]]]]:
+    """Times, values and handles of a curve's keys."""
+    name = parameter.name
+    times, values, handles = [], [], []
+    if not _is_list(rows) or not rows:
+        raise ValueFault(f"{name}: {word} must be a list [[{over}, value], ...].", (word,))
+    for i, row in enumerate(rows):
+        with within(word, i):
+            if not _is_list(row) or len(row) not in (2, 4):
+                raise ValueError(f"{name}: a key must be [{over}, value], not {_shown(row)}.")
+            time = _number(row[0], f"{name}: {over}")
+            if over in ("life", "random") and not 0 <= time <= 1:
+                raise ValueError(f"{name}: keys over {over} run from 0 to 1, not to {time:g}.")
+            times.append(time)
+            values.append(_plain(row[1], parameter))
+            if len(row) == 4:
+                handles.append([_handle(h, name) for h in row[2:]])
+    return times, values, handles
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str)
+
+
 def _handle(value: Any, name: str) -> list[float]:
-    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
+    if not _is_list(value) or len(value) != 2:
         raise ValueError(f"{name}: a handle must be [dt, dvalue], not {_shown(value)}.")
     return [_number(v, f"{name}: handle") for v in value]
 

@@ -42,7 +42,8 @@ class Entry:
         values = {key: v for key, v in value.items() if key not in ("type", "name")}
         type = value.get("type")
         if not isinstance(type, str):
-            raise fault(f"{self.kind}: {_a(noun)} needs a type. {self._menu()}")
+            message = f"{self.kind}: {_a(noun)} needs a type. {self._menu()}"
+            raise faults([Problem(("type",) if "type" in value else (), message)], value)
         try:
             found = find(self.kind, type)
         except SceneError as error:

@@ -99,27 +99,24 @@ def _toml(text: str, source: str) -> dict[str, Any]:
         raise SceneError([Problem((), f"not TOML: {words}{column}.", line)], source) from None
 
 
-class _TwiceError(Exception):
-    """A JSON object has a key twice."""
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    made = dict(pairs)
-    if len(made) != len(pairs):
-        raise _TwiceError
-    return made
-
-
 def _json(text: str, source: str) -> dict[str, Any]:
+    twice = False
+
+    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        nonlocal twice
+        made = dict(pairs)
+        twice = twice or len(made) != len(pairs)
+        return made
+
     try:
-        document = json.loads(text, object_pairs_hook=_unique)
+        document = json.loads(text, object_pairs_hook=unique)
     except json.JSONDecodeError as error:
         words = f"{error.msg[:1].lower()}{error.msg[1:]} (column {error.colno})"
         raise SceneError([Problem((), f"not JSON: {words}.", error.lineno)], source) from None
-    except _TwiceError:
-        lines, twice = json_lines(text)
-        found = [Problem(p, f'the key "{p[-1]}" is here a second time.', lines[p]) for p in twice]
-        raise SceneError(found, source) from None
+    if twice:
+        lines, again = json_lines(text)
+        found = [Problem(p, f'the key "{p[-1]}" is here a second time.', lines[p]) for p in again]
+        raise SceneError(found, source)
     if "\\u" in text:
         try:
             json.dumps(document, ensure_ascii=False).encode()

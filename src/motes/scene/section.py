@@ -15,7 +15,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from motes.control.constant import Setting
 from motes.control.control import Control
-from motes.errors import Problem, SceneError, likely
+from motes.errors import Problem, SceneError, likely, path_of
 from motes.parameter import Parameter
 from motes.source import attribute_docs
 
@@ -80,7 +80,8 @@ class Section(BaseModel):
         try:
             control = parameter.control(value)
         except ValueError as error:
-            raise fault(f"{cls.called(info.data)}{error}") from None
+            message = f"{cls.called(info.data)}{error}"
+            raise faults([Problem(path_of(error), message)], value) from None
         return control.value if isinstance(control, Setting) else control
 
     @classmethod
