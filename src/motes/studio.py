@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -100,15 +101,17 @@ class Studio:
         )
 
     @cached_property
-    def _visible(self) -> list[tuple[str, Component]]:
+    def _visible(self) -> tuple[list[tuple[str, Component]], list[Component]]:
+        """Solids that are drawn: the bent ones with their addresses, then the flat ones."""
         solids = [s for s in self.scene.solid if s.values["visible"].document()]
-        return [(component_address(None, s), s) for s in solids]
+        flat = [s for s in solids if getattr(type(s), "flat", False)]
+        return [(component_address(None, s), s) for s in solids if s not in flat], flat
 
     @cached_property
     def _shapes(self) -> tuple[Any, Any, Any, int]:
-        """Kernels `place` and `nearest` of the visible solids, and what they read."""
+        """Kernels `place` and `nearest` of the bent solids, and what they read."""
         text = Text("single")
-        surfaces = write_surfaces(text, self._visible)
+        surfaces = write_surfaces(text, self._visible[0])
         text.add(text.values.scene_text())
         entries = surfaces.length
         text.add(
@@ -121,13 +124,35 @@ class Studio:
         return module["place"], module["nearest"], text.values.arrays(np.float32), entries
 
     def _solids(self, time: float) -> Solids | None:
-        if not self._visible:
+        bent, flat = self._visible
+        if not bent and not flat:
             return None
-        place, nearest, K, entries = self._shapes
-        params = np.empty(entries, np.float32)
-        place(K, time, params)
-        colors = [s.values["color"].at(time)[:3] for _, s in self._visible]
-        return Solids(nearest, params, np.array(colors, np.float32))
+        nearest, params = None, np.empty(0, np.float32)
+        if bent:
+            place, nearest, K, entries = self._shapes
+            params = np.empty(entries, np.float32)
+            place(K, time, params)
+        solids = [*(s for _, s in bent), *flat]
+        colors = np.array([s.values["color"].at(time)[:3] for s in solids])
+        return Solids(nearest, params, colors, np.array([_plane(s, time) for s in flat]))
+
+
+def _plane(solid: Component, time: float) -> NDArray[np.float64]:
+    """Unit normal and offset (4,) of a flat solid, whose distance is linear in its own frame."""
+    distance = solid.kernel("distance")
+    assert distance is not None
+    own = {key: solid.values[key].at(time) for key in solid.own}
+    p = SimpleNamespace(**{key: v if len(v) > 1 else float(v[0]) for key, v in own.items()})
+    level = distance(p, 0.0, 0.0, 0.0)
+    slope = np.array([distance(p, *axis) - level for axis in np.eye(3)])
+    (cx, cy, cz), (sx, sy, sz) = (
+        f(np.radians(_three(solid.values["rotation"], time))) for f in (np.cos, np.sin)
+    )
+    around_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    around_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    around_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    normal = around_z @ around_y @ around_x @ slope
+    return np.append(normal, normal @ _three(solid.values["position"], time) - level)
 
 
 def _one(control: Control, time: float) -> float:

@@ -137,3 +137,53 @@ def test_solids_without_a_colour_or_with_bad_numbers_are_no_crash():
     assert np.isfinite(backdrop(CAMERA, SIZE, Sky(), broken).image).all()
     inside = Camera(position=(-1, 0, 1), look_at=(-1, 0, 1), up=(0, 0, 0))
     assert np.isfinite(backdrop(inside, (1, 1), Sky(), SOLIDS).image).all()
+
+
+@jit(inline=True)
+def ball(p, x, y, z):
+    """A sphere (center, radius)."""
+    dx, dy, dz = x - p[0], y - p[1], z - p[2]
+    return np.sqrt(dx * dx + dy * dy + dz * dz) - p[3], 0
+
+
+GROUND = np.array([[0.0, 0.0, 1.0, 0.0]])
+
+
+def test_a_plane_reaches_to_the_horizon():
+    """Every ray below the horizon meets the ground, exactly at t = height / -ray_z, and no other."""
+    solids = Solids(None, np.empty(0), COLORS[:1], GROUND)
+    depths = backdrop(CAMERA, SIZE, Sky(), solids).depths
+    plane, _ = exact_depths()
+    inside = depths.edge < 0
+    assert depths.depth[inside] == pytest.approx(plane[inside], rel=1e-3)
+
+
+def test_the_horizon_is_smooth():
+    """Towards the horizon the ground fades into the sky: no line, along it no step."""
+    camera = Camera(position=(3, -6, 2), look_at=(0, 0, 1), field_of_view=40)
+    size = (640, 360)
+    solids = Solids(None, np.empty(0), COLORS[:1], GROUND)
+    image = backdrop(camera, size, Sky(haze=20.0), solids).image[..., 1]
+    top = round(180 - camera.focal(360) / np.hypot(3, 6))
+    assert np.abs(np.diff(image[top - 8 : top + 8], axis=0)).max() < 0.01
+    assert np.abs(np.diff(image[top - 8 : top + 8], axis=1)).max() < 1e-3
+
+
+def test_a_ball_and_a_plane_are_drawn_as_by_one_distance_function():
+    """Depth, shadow and colour, but for silhouettes: there a pixel is a mean of 4 points."""
+    sky = Sky(sun=Sun(direction=(-1, -0.5, 1.5), softness=0.0))
+    apart = Solids(ball, PARAMS[:4], COLORS[[1, 0]], GROUND)
+    joined = replace(SOLIDS, params=np.append(PARAMS[:4], [0, 0, -50, 1]))
+    first, second = (backdrop(CAMERA, SIZE, sky, solids) for solids in (apart, joined))
+    near = (first.depths.depth < 30) & (first.depths.edge < 0) & (second.depths.edge < 0)
+    assert near.mean() > 0.5
+    assert first.depths.depth[near] == pytest.approx(second.depths.depth[near], rel=0.01)
+    differs = np.abs(first.image - second.image).max(axis=2)[near] > 0.01
+    assert differs.mean() < 0.01
+
+
+def test_behind_a_plane_there_is_no_sun():
+    """A ground that faces away from the sun is between it and everything."""
+    sky = replace(Sky.plain((0.1, 0.1, 0.1)), sun=Sun(direction=(0, -1, -0.1), glow=0.0), haze=1e6)
+    solids = Solids(ball, PARAMS[:4], np.ones((2, 3)), GROUND)
+    assert backdrop(CAMERA, SIZE, sky, solids).image[..., :3].max() == pytest.approx(0.1, rel=1e-3)

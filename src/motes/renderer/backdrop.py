@@ -55,16 +55,18 @@ def backdrop(
         return Backdrop(np.zeros((height, width, 4), np.float32), NO_SOLIDS)
     y, x = np.divmod(np.arange(width * height, dtype=np.int32), width)
     rays = camera.rays(x + _HALF, y + _HALF, size)
-    near = np.float32(np.inf) if solids is None else _clear_way(camera, size, solids)
-    hits, color = _look(camera, rays, near, height, sky, solids)
+    near = np.full(len(rays), camera.near, np.float32)
+    clear = near if solids is None else _clear_way(camera, size, solids)
+    hits, color = _look(camera, rays, near, clear, height, sky, solids)
     image = color.reshape(height, width, 4)
     if solids is None:
         return Backdrop(image, NO_SOLIDS)
-    row, column = np.nonzero(_edges(hits, size))
+    row, column = np.nonzero(_edges(hits, size, solids.bent))
     sub_x = (column[:, None] + _SUB_X).ravel()
     sub_y = (row[:, None] + _SUB_Y).ravel()
     sub_rays = camera.rays(sub_x, sub_y, size)
-    sub_hits, sub_color = _look(camera, sub_rays, camera.near, height, sky, solids)
+    near = np.full(len(sub_rays), camera.near, np.float32)
+    sub_hits, sub_color = _look(camera, sub_rays, near, near, height, sky, solids)
     image[row, column] = sub_color.reshape(-1, 4, 4).mean(axis=1)
     edge = np.full((height, width), -1, np.int32)
     edge[row, column] = np.arange(len(row))
@@ -75,19 +77,20 @@ def backdrop(
 
 
 def _clear_way(camera: Camera, size: tuple[int, int], solids: Solids) -> Array:
-    """Distance up to which the ray of each pixel (h w,) is free, found for blocks of pixels."""
+    """Distance up to which no bent solid is near a pixel's ray, (h w,), found for blocks."""
     width, height = size
     across, down = -(-width // BLOCK), -(-height // BLOCK)
     y, x = np.divmod(np.arange(across * down, dtype=np.int32), across)
     rays = camera.rays((x + _HALF) * BLOCK, (y + _HALF) * BLOCK, size)
     hits = Hits.none(len(rays))
-    hits.distance[:] = camera.near
+    near = np.full(len(rays), camera.near, np.float32)
     tasks = blocks(len(rays), RAYS // BLOCK)
     reach = BLOCK * 0.7072 / camera.focal(height)
 
     def task(number: int) -> None:
         rows = slice(*tasks[number])
-        trace(solids, camera.position, rays[rows], reach, _UP, 0.0, hits.part(rows), beams=True)
+        ways = (camera.position, rays[rows], near[rows])
+        trace(solids, *ways, reach, _UP, 0.0, hits.part(rows), beams=True)
 
     share(task, len(tasks))
     square = hits.distance.reshape(down, across).repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)
@@ -97,14 +100,17 @@ def _clear_way(camera: Camera, size: tuple[int, int], solids: Solids) -> Array:
 def _look(
     camera: Camera,
     rays: Array,
-    near: Array | np.float32 | float,
+    near: Array,
+    clear: Array,
     height: int,
     sky: Sky | None,
     solids: Solids | None,
 ) -> tuple[Hits, Array]:
-    """What rays (n, 3) meet beyond `near`, and their light and coverage (n, 4)."""
+    """What rays (n, 3) meet beyond `near`, and their light and coverage (n, 4).
+
+    Bent solids are looked for beyond `clear` only.
+    """
     hits = Hits.none(len(rays))
-    hits.distance[:] = near
     color = np.ones((len(rays), 4), np.float32)
     lamp = sky or Sky()
     numbers = lamp.numbers()
@@ -112,12 +118,17 @@ def _look(
     tasks = blocks(len(rays), RAYS)
     colors = np.zeros((1, 3), np.float32) if solids is None else solids.colors
     width = 1.0 / camera.focal(height)
+    sun = numbers[4]
+    if lamp.sun is None or (solids is not None and solids.hide(sun)):
+        sun = np.zeros(3, np.float32)
 
     def task(number: int) -> None:
         rows = slice(*tasks[number])
         some = hits.part(rows)
         if solids is not None:
-            trace(solids, camera.position, rays[rows], width, numbers[4], softness, some)
+            solids.meet_planes(camera.position, rays[rows], near[rows], some)
+            ways = (camera.position, rays[rows], clear[rows])
+            trace(solids, *ways, width, sun, softness, some)
             if some.index.max(initial=-1) >= len(colors):
                 raise ValueError(f"solid {some.index.max()} has no colour; there are {len(colors)}")
         surface = (some.distance, some.normal, some.index, some.lit)
@@ -129,8 +140,11 @@ def _look(
     return hits, color
 
 
-def _edges(hits: Hits, size: tuple[int, int]) -> NDArray[np.bool_]:
-    """Pixels with a neighbour that shows another solid, another face, or is much farther."""
+def _edges(hits: Hits, size: tuple[int, int], bent: int) -> NDArray[np.bool_]:
+    """Pixels with a neighbour that shows another solid, another face, or is much farther.
+
+    Indices from `bent` on are those of planes, which have a single face.
+    """
     width, height = size
     index = hits.index.reshape(height, width)
     near = 1.0 / hits.distance.reshape(height, width)
@@ -145,7 +159,7 @@ def _edges(hits: Hits, size: tuple[int, int]) -> NDArray[np.bool_]:
         differs &= np.maximum(index[first], index[second]) >= 0
         # On a flat face 1/distance changes evenly, so only a jump counts.
         jump = np.abs(near[first] - near[second]) > 0.1 * np.maximum(near[first], near[second])
-        differs |= jump
+        differs |= jump & (index[first] < bent)
         edges[first] |= differs
         edges[second] |= differs
     return edges

@@ -1,4 +1,4 @@
-"""Opaque solids: found by sphere tracing of a distance function, once per pixel.
+"""Opaque solids: planes met exactly, the others by sphere tracing of a distance function.
 
 The tracer steps along each ray by the distance to the nearest surface, and a little farther where
 the last steps show the surface to be flat (Balint and Valasek 2018); when two such spheres of empty
@@ -8,7 +8,7 @@ space turn out not to overlap it steps back, so nothing is jumped over.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -21,7 +21,7 @@ from motes.renderer.camera import Vector
 Array = NDArray[np.float32]
 
 FAR = 1000.0
-"""Solids farther than this are lost in the haze [m]."""
+"""Solids other than planes are lost in the haze beyond this [m]."""
 
 _ZERO = np.float32(0)
 _ONE = np.float32(1)
@@ -37,23 +37,28 @@ _SHADOW_STEPS = 40
 
 @dataclass(frozen=True, eq=False)
 class Solids:
-    """Solids as one distance function.
+    """Solids as one distance function, and planes, which reach to the horizon.
 
     Two are equal where they draw the same picture, which is what a `Renderer` asks before it traces
     them again.
     """
 
-    nearest: Callable[..., Any]
-    """Inline kernel (params, x, y, z) -> (distance to the nearest surface [m], its index)."""
+    nearest: Callable[..., Any] | None
+    """Inline kernel (params, x, y, z) -> (distance to the nearest surface [m], its index); None
+    where there are planes alone."""
 
     params: NDArray[np.floating]
     """(p,) numbers that `nearest` reads."""
 
     colors: Array
-    """(k, 3) linear colour of the solid of each index."""
+    """(k, 3) linear colour of the solid of each index, those of the planes last."""
+
+    planes: Array = field(default_factory=lambda: np.empty((0, 4), np.float32))
+    """(m, 4) unit normal n and offset [m]: outside, n . x > offset."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "params", np.ascontiguousarray(self.params))
+        object.__setattr__(self, "planes", np.asarray(self.planes, np.float32).reshape(-1, 4))
         colors = np.ascontiguousarray(self.colors, np.float32)
         if colors.ndim != 2 or colors.shape[1] != 3:
             raise ValueError(f"colors must have the shape (k, 3), not {colors.shape}")
@@ -66,7 +71,29 @@ class Solids:
             self.nearest is other.nearest
             and np.array_equal(self.params, other.params, equal_nan=True)
             and np.array_equal(self.colors, other.colors)
+            and np.array_equal(self.planes, other.planes, equal_nan=True)
         )
+
+    @property
+    def bent(self) -> int:
+        """How many indices belong to `nearest`; those of the planes follow."""
+        return len(self.colors) - len(self.planes)
+
+    def hide(self, sun: Array) -> bool:
+        """Whether a plane is between everything and a far light in the direction `sun` (3,)."""
+        return bool((self.planes[:, :3] @ sun < 0).any())
+
+    def meet_planes(self, position: Vector, rays: Array, near: Array, into: Hits) -> None:
+        """Write where rays (n, 3) meet planes beyond `near` and before `into.distance`."""
+        for index, (x, y, z, offset) in enumerate(self.planes, self.bent):
+            normal = np.array([x, y, z])
+            height = np.float32(normal @ np.asarray(position) - offset)
+            with np.errstate(all="ignore"):
+                distance = -height / (rays @ normal)
+            met = (height > 0) & (distance > near) & (distance < into.distance)
+            into.distance[met] = distance[met]
+            into.normal[met] = normal
+            into.index[met] = index
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +131,7 @@ def trace(
     solids: Solids,
     position: Vector,
     rays: Array,
+    near: Array,
     width: float,
     sun: Array,
     softness: float,
@@ -111,16 +139,18 @@ def trace(
     *,
     beams: bool = False,
 ) -> None:
-    """Follow rays (n, 3) on from `into.distance`, and write what they meet into `into`.
+    """Follow rays (n, 3) on from `near` (n,) to at most `into.distance`; write what they meet.
 
-    width is the angle between rays [rad], sun (3,) the direction of the light that throws shadows.
-    With `beams` each ray stands for all that are within `width` of it: its distance becomes one up
-    to which none of them meets anything, or infinite if none does at all.
+    width is the angle between rays [rad], sun (3,) the direction of the light that throws shadows,
+    or 0. With `beams` each ray stands for all that are within `width` of it: its distance becomes
+    one up to which none of them meets anything, or stays if none does at all.
     """
+    if solids.nearest is None:
+        return
     sharpness = 1.0 / max(softness, 1e-4)
     setting = np.array([*position, width, sharpness, *sun], np.float32)
     hits = (into.distance, into.normal, into.index, into.lit)
-    _tracer(solids.nearest)(solids.params, setting, rays, beams, *hits)
+    _tracer(solids.nearest)(solids.params, setting, rays, near, beams, *hits)
 
 
 @cache
@@ -132,6 +162,7 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
         params: Any,
         setting: Any,
         rays: Any,
+        near: Any,
         beams: Any,
         distance: Any,
         normal: Any,
@@ -140,17 +171,26 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
     ) -> None:
         width, sharpness = setting[3], setting[4]
         for i in range(rays.shape[0]):
-            t = distance[i]
-            if not t < _FAR:
-                continue
+            t, end = near[i], min(distance[i], _FAR)
             x, y, z = setting[0], setting[1], setting[2]
             dx, dy, dz = rays[i, 0], rays[i, 1], rays[i, 2]
-            distance[i] = _NOTHING
             # Two ways, one after the other: from the eye, then from what it met to the sun.
             step, before, light = _ZERO, _ZERO, _ONE
-            shadow = False
+            shadow, arrived = False, not t < end
             tries = 0
             while tries < _STEPS:
+                if arrived:
+                    t = distance[i]
+                    nx, ny, nz = normal[i, 0], normal[i, 1], normal[i, 2]
+                    if not nx * setting[5] + ny * setting[6] + nz * setting[7] > _ZERO:
+                        light = _ZERO
+                    if beams or light == _ZERO or t > _FAR:
+                        break
+                    e = width * t
+                    x, y, z = x + t * dx + e * nx, y + t * dy + e * ny, z + t * dz + e * nz
+                    dx, dy, dz = setting[5], setting[6], setting[7]
+                    t, step, before, tries = np.float32(2) * e, _ZERO, _ZERO, _STEPS - _SHADOW_STEPS
+                    shadow, arrived = True, False
                 tries += 1
                 found, which = nearest(params, x + t * dx, y + t * dy, z + t * dz)
                 d = np.float32(found)
@@ -167,6 +207,9 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                     if light < _DARK:
                         light = _ZERO
                         break
+                elif t > end:
+                    arrived = True
+                    continue
                 elif beams:
                     forth -= width * t
                     if forth < width * t:
@@ -177,29 +220,20 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                     t += min(d * step / max(before - d, _TINY), np.float32(16) * width * t)
                     distance[i] = t
                     index[i] = which
-                    x, y, z = x + t * dx, y + t * dy, z + t * dz
+                    px, py, pz = x + t * dx, y + t * dy, z + t * dz
                     # Central differences on the corners of a tetrahedron.
                     e = width * t
-                    a, _ = nearest(params, x + e, y - e, z - e)
-                    b, _ = nearest(params, x - e, y - e, z + e)
-                    c, _ = nearest(params, x - e, y + e, z - e)
-                    f, _ = nearest(params, x + e, y + e, z + e)
+                    a, _ = nearest(params, px + e, py - e, pz - e)
+                    b, _ = nearest(params, px - e, py - e, pz + e)
+                    c, _ = nearest(params, px - e, py + e, pz - e)
+                    f, _ = nearest(params, px + e, py + e, pz + e)
                     nx = np.float32(a - b - c + f)
                     ny = np.float32(c - a - b + f)
                     nz = np.float32(b - a - c + f)
                     scale = _ONE / np.float32(np.sqrt(nx * nx + ny * ny + nz * nz + _TINY))
-                    nx, ny, nz = nx * scale, ny * scale, nz * scale
-                    normal[i, 0], normal[i, 1], normal[i, 2] = nx, ny, nz
-                    dx, dy, dz = setting[5], setting[6], setting[7]
-                    if nx * dx + ny * dy + nz * dz <= _ZERO:
-                        light = _ZERO
-                        break
-                    x, y, z = x + e * nx, y + e * ny, z + e * nz
-                    shadow = True
-                    t, step, before, tries = np.float32(2) * e, _ZERO, _ZERO, _STEPS - _SHADOW_STEPS
+                    normal[i, 0], normal[i, 1], normal[i, 2] = nx * scale, ny * scale, nz * scale
+                    arrived = True
                     continue
-                elif t > _FAR:
-                    break
                 elif step > _ZERO:
                     fall = before - d
                     forth += np.float32(0.9) * d * max(step - fall, _ZERO) / (step + fall)
