@@ -110,13 +110,16 @@ def _number(value: Any, name: str) -> float:
 def _whole(value: Any, parameter: Parameter) -> int:
     """A whole number within the parameter's range, exact beyond what a float holds."""
     name = parameter.name
-    number = int(value) if isinstance(value, int | np.integer) else _number(value, name)
-    if isinstance(value, bool) or number != int(number):
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if isinstance(value, float):
+        whole = _number(value, name).is_integer()
+    if not whole:
         raise ValueError(f"{name} must be a whole number, not {_shown(value)}.")
+    number = int(value)
     if not parameter.contains(number, number):
         unit = f" {parameter.unit}" if parameter.unit else ""
-        raise ValueError(f"{name} = {_shown(int(number))}{unit} must be {parameter.range()}.")
-    return int(number)
+        raise ValueError(f"{name} = {_shown(number)}{unit} must be {parameter.range()}.")
+    return number
 
 
 def _shown(value: Any) -> str:
