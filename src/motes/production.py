@@ -6,12 +6,11 @@ own, so that neither waits for a disk or a codec.
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from motes.errors import SceneError
 from motes.files import make_folder
 from motes.frame import Frame
+from motes.progress import Report, Watch
 from motes.record.frames import FrameStore, Manifest, digest_of
 from motes.rehearsal import Rehearsal
 
@@ -37,35 +37,6 @@ STILLS = 6
 
 WAITING = 3
 """Frames that may wait for the disk and the encoder; more would only use memory."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a film is."""
-
-    done: int = 0
-    """Frames that are finished."""
-
-    total: int = 0
-    """Frames that the film will have."""
-
-    particles: int = 0
-    """Particles in the last frame."""
-
-    particle_steps: int = 0
-    """Steps of integration so far, summed over the particles."""
-
-    simulating: float = 0.0
-    """Time spent on them [s]."""
-
-    compiling: str = ""
-    """Name of the kernel that is being compiled, because no earlier run has kept it."""
-
-    still: Path | None = None
-    """The first picture, once it is written."""
-
-
-Watch = Callable[[Progress], None]
 
 
 @dataclass(frozen=True)
@@ -108,7 +79,7 @@ def film(
     """
     from motes.simulation import Simulation
 
-    report = _Report(watch)
+    report = Report(watch)
     with Rehearsal(scene) as rehearsal, report.compiling(rehearsal.begin if draw else None):
         simulation = Simulation(scene)
         numbers = _numbers(first, last, range(1, simulation.frame_count + 1))
@@ -150,7 +121,7 @@ def redraw(
     scene = from_document(store.manifest.scene, source=str(store.folder / "manifest.json"))
     scene = scene.with_values(values or {})
     numbers = _numbers(first, last, store.numbers())
-    report = _Report(watch)
+    report = Report(watch)
     report.begin(len(numbers))
     target = Path(output) if output is not None else store.folder.parent
     path = target / f"{store.manifest.name}.{form}"
@@ -197,7 +168,7 @@ def _kept(
     numbers: list[int],
     store: FrameStore,
     follower: _Follower,
-    report: _Report,
+    report: Report,
 ) -> Iterator[Frame]:
     """Frames of a simulation, each on its way to the store before anybody draws it."""
     frames = simulation.frames(first=numbers[0], last=numbers[-1])
@@ -227,7 +198,7 @@ def _draw(
     scene: Scene,
     path: Path,
     follower: _Follower,
-    report: _Report,
+    report: Report,
 ) -> Path:
     """Draw frames into a film at `path`; gives its contact sheet, until then the first still."""
     from motes.renderer import Video, contact_sheet
@@ -287,63 +258,3 @@ class _Follower:
         """Wait for all that was given."""
         while self._waiting:
             self._waiting.popleft().result()
-
-
-class _Report:
-    """Keeps the progress of a film and tells it to the one who watches."""
-
-    def __init__(self, watch: Watch | None) -> None:
-        self._watch = watch
-        self._now = Progress()
-
-    def _tell(self, **changes: Any) -> None:
-        self._now = replace(self._now, **changes)
-        if self._watch is not None:
-            self._watch(self._now)
-
-    @contextmanager
-    def compiling(self, also: Callable[[], None] | None = None) -> Iterator[None]:
-        """Tell of every kernel that is compiled within the block, and call `also`."""
-        from motes.jit import listen
-
-        def tell(kernel: str) -> None:
-            if also is not None:
-                also()
-            self._tell(compiling=kernel)
-
-        listen(tell)
-        try:
-            yield
-        finally:
-            listen(None)
-
-    def begin(self, total: int) -> None:
-        """The number of frames is known."""
-        self._tell(total=total)
-
-    def counted(self, frames: Iterable[Frame]) -> Iterator[Frame]:
-        """Pass frames on and tell how many particles they hold."""
-        for frame in frames:
-            self._tell(particles=frame.count, compiling="")
-            yield frame
-
-    def simulated(self, frames: Iterable[Frame], simulation: Simulation) -> Iterator[Frame]:
-        """Pass frames on and tell what their simulation cost."""
-        begun = time.perf_counter()
-        for frame in frames:
-            self._tell(
-                particles=frame.count,
-                particle_steps=simulation.work,
-                simulating=self._now.simulating + time.perf_counter() - begun,
-                compiling="",
-            )
-            yield frame
-            begun = time.perf_counter()
-
-    def still(self, path: Path) -> None:
-        """The first picture is written."""
-        self._tell(still=path)
-
-    def finished(self) -> None:
-        """One more frame is done."""
-        self._tell(done=self._now.done + 1)

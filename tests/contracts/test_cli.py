@@ -27,7 +27,8 @@ from motes.errors import (
     SceneError,
     SimulationError,
 )
-from motes.production import Made, Progress
+from motes.production import Made
+from motes.progress import Progress
 from motes.record.frames import FrameStore
 
 HEAVY = ("numba", "numpy", "pydantic", "rich", "PIL", "av", "scipy")

@@ -14,7 +14,8 @@ from jet import jet
 
 from motes.errors import OutputError, SceneError
 from motes.frame import Frame
-from motes.production import Progress, film, open_frames, redraw
+from motes.production import film, open_frames, redraw
+from motes.progress import Progress
 from motes.record.frames import FrameStore
 
 av = pytest.importorskip("av")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from motes.production import Progress
+    from motes.progress import Progress
 
 COMPILING = "compiling (first run only)"
 
