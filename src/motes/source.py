@@ -13,6 +13,8 @@ from itertools import pairwise
 from types import FunctionType
 from typing import Any
 
+from motes.errors import SceneError
+
 
 @lru_cache(maxsize=256)
 def _tree(text: str) -> ast.Module:
@@ -71,8 +73,17 @@ def class_source(cls: type) -> str:
 
 
 def function_node(function: Callable[..., Any]) -> ast.FunctionDef:
-    """Syntax tree of a function, free of decorators, annotations and docstring."""
-    lines, _ = inspect.getsourcelines(function)
+    """Syntax tree of a function, free of decorators, annotations and docstring.
+
+    Raises SceneError for a function without source text, such as one typed at Python's own prompt.
+    """
+    try:
+        lines, _ = inspect.getsourcelines(function)
+    except OSError:
+        raise SceneError(
+            f"kernel {function.__qualname__}: its source text cannot be read. "
+            "Write the component in a file or a notebook cell."
+        ) from None
     node = ast.parse(textwrap.dedent("".join(lines))).body[0]
     assert isinstance(node, ast.FunctionDef)
     node.decorator_list = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import linecache
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import motes
 from motes.catalog import KINDS, Component, catalog, component, find, quantity
 from motes.errors import SceneError
 from motes.kernel import kernel
@@ -36,7 +38,7 @@ def values(part: type[Component]) -> SimpleNamespace:
 
 
 def particle(**changes: float) -> SimpleNamespace:
-    state = dict(x=0.7, y=-0.4, z=1.1, vx=0.3, vy=0.8, vz=-0.5)
+    state = {"x": 0.7, "y": -0.4, "z": 1.1, "vx": 0.3, "vy": 0.8, "vz": -0.5}
     return SimpleNamespace(
         **{**state, **changes}, mass=1.3, age=0.4, life=2.0, size=0.1, color=(1.0, 0.5, 0.2, 0.8)
     )
@@ -132,10 +134,8 @@ def test_a_component_of_a_script_joins_the_catalog() -> None:
         """Size of the pull."""
 
         @kernel
-        def acceleration(p: Any, q: Any, t: Any) -> Any:  # noqa: N805
+        def acceleration(p: Any, q: Any, t: Any) -> Any:
             return p.strength, 0.0, 0.0
-
-    import motes
 
     emitter = motes.emit.Point(burst=[{"count": 1}])
     scene = motes.Scene(systems=[motes.System("a", emit=[emitter])], force=[Pull(strength=3.0)])
@@ -145,10 +145,50 @@ def test_a_component_of_a_script_joins_the_catalog() -> None:
     assert catalog("force")["test_pull"] is Pull
 
 
+CELL = """
+from motes.catalog import Number, component, quantity
+from motes.kernel import kernel
+
+@component(kind="force", name="test_cell")
+class Cell:
+    \"\"\"A push: a = (push, 0, 0).\"\"\"
+
+    push: Number = quantity(1.0, "m/s2")
+    \"\"\"Its strength.\"\"\"
+
+    @kernel
+    def acceleration(p, q, t):
+        return p.push, 0.0, 0.0
+"""
+
+
+def test_a_component_of_a_notebook_cell_joins_the_catalog() -> None:
+    """A cell has no file; its text stands in linecache, where notebooks put it."""
+    name = "<cell 1>"
+    linecache.cache[name] = (len(CELL), None, CELL.splitlines(True), name)
+    scope: dict[str, Any] = {"__name__": "__main__"}
+    exec(compile(CELL, name, "exec"), scope)
+    assert scope["Cell"].help() == {"push": "Its strength."}
+    assert "push" in scope["Cell"].source()
+    emitter = find("emit", "point")(burst=[{"count": 1}])
+    system = motes.System("a", emit=[emitter], force=[scope["Cell"](push=2.0)])
+    simulation = motes.Simulation(motes.Scene(systems=[system]))
+    simulation.run(until=1.0)
+    assert simulation["a"].velocity[0, 0] == pytest.approx(2.0, rel=1e-5)
+
+
+def test_a_kernel_without_source_text_is_explained() -> None:
+    scope: dict[str, Any] = {"__name__": "__main__"}
+    exec(compile(CELL.replace("test_cell", "test_prompt"), "<stdin>", "exec"), scope)
+    system = motes.System("a", emit=[find("emit", "point")()], force=[scope["Cell"]()])
+    with pytest.raises(SceneError, match="file or a notebook cell"):
+        motes.Simulation(motes.Scene(systems=[system]))
+
+
 def test_faults_of_a_component_are_said_in_one_line() -> None:
     drag = find("force", "drag")
     with pytest.raises(
-        SceneError, match='force "drag" has no parameter "rat". Did you mean "rate"'
+        SceneError, match=r'force "drag" has no parameter "rat"\. Did you mean "rate"'
     ):
         drag(rat=1.0)
     with pytest.raises(SceneError, match="rate = -1 kg/s must be at least 0 kg/s"):
