@@ -103,12 +103,12 @@ def test_directions_fill_a_cone_evenly() -> None:
 
 
 SHAPES = {
-    "Disc": (dict(radius=2.0), lambda p: np.hypot(p[:, 0], p[:, 1]) ** 2 / 4, (0, 1)),
-    "Ring": (dict(radius=2.0, inner=1.0), lambda p: np.hypot(p[:, 0], p[:, 1]) ** 2, (1, 4)),
-    "Sphere": (dict(radius=2.0), lambda p: np.linalg.norm(p, axis=1) ** 3 / 8, (0, 1)),
-    "Shell": (dict(radius=2.0, thickness=1.0), lambda p: np.linalg.norm(p, axis=1) ** 3, (1, 8)),
-    "Box": (dict(size=(2.0, 4.0, 6.0)), lambda p: p[:, 2], (-3, 3)),
-    "Line": (dict(length=3.0), lambda p: p[:, 0], (-1.5, 1.5)),
+    "Disc": ({"radius": 2.0}, lambda p: np.hypot(p[:, 0], p[:, 1]) ** 2 / 4, (0, 1)),
+    "Ring": ({"radius": 2.0, "inner": 1.0}, lambda p: np.hypot(p[:, 0], p[:, 1]) ** 2, (1, 4)),
+    "Sphere": ({"radius": 2.0}, lambda p: np.linalg.norm(p, axis=1) ** 3 / 8, (0, 1)),
+    "Shell": ({"radius": 2.0, "thickness": 1.0}, lambda p: np.linalg.norm(p, axis=1) ** 3, (1, 8)),
+    "Box": ({"size": (2.0, 4.0, 6.0)}, lambda p: p[:, 2], (-3, 3)),
+    "Line": ({"length": 3.0}, lambda p: p[:, 0], (-1.5, 1.5)),
 }
 
 

@@ -76,7 +76,7 @@ def test_euler_leaves_the_circle_by_its_exact_factor() -> None:
 
 @pytest.mark.parametrize("step", [0.01, 0.037, 0.2])
 def test_a_bouncing_ball_keeps_its_times_at_any_step(step: float) -> None:
-    """Dropped from 1 m with restitution 0.8: free parabolas between impacts, at rest at 4.0637 s."""
+    """Dropped from 1 m, restitution 0.8: parabolas between impacts, at rest at 4.0637 s."""
     e, fall = 0.8, math.sqrt(2 / G)
     rest = fall * (1 + e) / (1 - e)
     assert rest == pytest.approx(4.063712769, abs=1e-8)
@@ -156,7 +156,7 @@ def test_a_thin_fast_plate_is_not_missed() -> None:
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "leapfrog"])
 @pytest.mark.parametrize("drag", ["Drag", "QuadraticDrag"])
 def test_no_step_makes_drag_explode(integrator: str, drag: str) -> None:
-    """A splitting integrates v' = -k (v - u) exactly: at k h = 1e7 the particle has the wind's speed."""
+    """A splitting integrates v' = -k (v - u) exactly: at k h = 1e7 it moves with the wind."""
     force = {
         "Drag": motes.force.Drag(rate=1e6, wind=(3.0, 0.0, 0.0)),
         "QuadraticDrag": motes.force.QuadraticDrag(k=1e6, wind=(3.0, 0.0, 0.0)),
