@@ -194,9 +194,11 @@ def _varying(value: Mapping[str, Any], parameter: Parameter) -> Control:
     for marks, make in _FORMS:
         if all(mark in value for mark in marks):
             return make(value, parameter, document)
-    raise ValueError(
-        f"{name}: {_shown(dict(value))} is no control. It takes {_allowed(parameter)}."
-    )
+    takes = f"It takes {_allowed(parameter)}."
+    if stranger := next((str(key) for key in value if key not in _WORDS), None):
+        hint = likely(stranger, _WORDS)
+        raise ValueFault(f'{name} has no key "{stranger}".{hint} {takes}', (stranger,))
+    raise ValueError(f"{name}: {_shown(value)} is no control. {takes}")
 
 
 def _only(value: Mapping[str, Any], keys: Sequence[str], name: str) -> None:
@@ -349,3 +351,6 @@ _FORMS = (
     (("normal",), _normal),
     (("choice",), _choice),
 )
+
+_WORDS = ("spread", "interpolation", "before", "after", *(m for marks, _ in _FORMS for m in marks))
+"""Every key that some control has."""
