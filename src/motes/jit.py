@@ -28,6 +28,7 @@ from numba.core.dispatcher import Dispatcher
 
 from motes.errors import OutputError
 from motes.files import written_whole
+from motes.inlining import InlineCompiler, Inlined
 
 FAST = frozenset({"reassoc", "contract", "arcp", "nsz"})
 """Reorders and fuses arithmetic, but NaN and infinity stay honest (no nnan, no ninf)."""
@@ -66,6 +67,7 @@ def jit(
     """
     if function is None:
         return lambda f: jit(f, flags=flags, inline=inline)
+    extra = {"pipeline_class": InlineCompiler} if inline else {}
     compiled = numba.njit(
         nogil=True,
         fastmath=set(flags) if flags else False,
@@ -73,8 +75,13 @@ def jit(
         forceinline=inline,
         no_cfunc_wrapper=True,
         no_cpython_wrapper=inline,
+        **extra,
     )(function)
-    if not inline and not numba.config.DISABLE_JIT:
+    if numba.config.DISABLE_JIT:
+        return compiled
+    if inline:
+        compiled.__class__ = Inlined
+    else:
         compiled._cache = _KernelCache(function, ",".join(sorted(flags)))
     return compiled
 

@@ -131,7 +131,7 @@ class Stepper:
             low, high = parts[k]
             impacts[k] = self.system.exceptions(
                 rows.position, rows.velocity, rows.birth, rows.columns, exceptional[low:high],
-                self.system.K_exact, interval.begin, interval.length,
+                self.system.K_exact, self.system.K_solid, interval.begin, interval.length,
             )  # fmt: skip
 
         share(care, len(parts))

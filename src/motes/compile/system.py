@@ -45,24 +45,31 @@ class CompiledSystem:
     ) -> None:
         self.motion = motion
         hard = [(a, s) for a, s in solids if s.values["collides"].document()]
-        self.fast, self.surfaces = self._text(hard, precision, strict)
+        self.fast = Text(precision, strict)
+        write_motion(self.fast, motion)
+        self.surfaces = self._solid(self.fast, hard)
         write_straight(self.fast, motion, self.surfaces)
         self.fast.add(self.fast.values.scene_text())
-        self.exact, _ = self._text(hard, "double", strict)
+        self.exact = Text("double", strict)
+        write_motion(self.exact, motion)
         write_flight(self.exact, motion)
         self.exact.add(self.exact.values.scene_text())
+        # Apart from the motion, so that a change of forces leaves its machine code as it is.
+        self.solid = Text("double", strict)
+        self._solid(self.solid, hard)
+        self.solid.add(self.solid.values.scene_text())
         self.columns = self._columns()
         self._emitters, self._strict = emitters, strict
         self.K = self.fast.values.arrays(self.fast.real)
         self.K_exact = self.exact.values.arrays(np.float64)
+        self.K_solid = self.solid.values.arrays(np.float64)
 
-    def _text(self, solids: Addressed, precision: str, strict: bool) -> tuple[Text, Surfaces | None]:
-        text = Text(precision, strict)
-        write_motion(text, self.motion)
-        surfaces = write_surfaces(text, solids) if solids else None
-        if surfaces is not None:
-            write_threat(text, self.motion, surfaces)
-        return text, surfaces
+    def _solid(self, text: Text, solids: Addressed) -> Surfaces | None:
+        if not solids:
+            return None
+        surfaces = write_surfaces(text, solids)
+        write_threat(text, self.motion, surfaces)
+        return surfaces
 
     def _columns(self) -> list[Column]:
         """Columns of the kernels first, then traits that only drawing reads."""
@@ -95,7 +102,9 @@ class CompiledSystem:
     @cached_property
     def exceptions(self) -> Any:
         """Kernel: given rows through the step, from their birth, through impacts."""
-        return exceptions_kernel(self._exact_module, self.motion, self.surfaces)
+        return exceptions_kernel(
+            self._exact_module, self.solid.module(), self.motion, self.surfaces
+        )
 
     def carried(self, particles: Particles, time: float) -> NDArray[np.float64]:
         """Velocity (n, 3) [m/s] that the flows give to particles that have none of their own."""
