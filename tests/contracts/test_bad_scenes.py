@@ -20,18 +20,18 @@ from motes.scene import Scene, System, from_document, gallery_text, load, loads
 from motes.scene.limits import SIZE
 
 LIMIT = 1.0
-"""Seconds that a file may take [s]."""
+"""Time of the processor that a file may take [s]; waiting for other programs does not count."""
 
 
 def read(content: str | bytes, format: Any = "toml") -> str:
     """What reading says, or nothing for a good scene; it must be quick."""
-    begun = time.perf_counter()
+    begun = time.process_time()
     lines: list[str] = []
     try:
         loads(content, "bad", format)
     except SceneError as error:
         lines = error.lines()
-    assert time.perf_counter() - begun < LIMIT
+    assert time.process_time() - begun < LIMIT
     assert all(line.isprintable() for line in lines)
     return "\n".join(lines)
 
