@@ -150,7 +150,7 @@ GROUND = np.array([[0.0, 0.0, 1.0, 0.0]])
 
 
 def test_a_plane_reaches_to_the_horizon():
-    """Every ray below the horizon meets the ground, exactly at t = height / -ray_z, and no other."""
+    """Every ray below the horizon meets the ground, at t = height / -ray_z; no other does."""
     solids = Solids(None, np.empty(0), COLORS[:1], GROUND)
     depths = backdrop(CAMERA, SIZE, Sky(), solids).depths
     plane, _ = exact_depths()

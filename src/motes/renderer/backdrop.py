@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from motes.jit import blocks, share
 from motes.renderer.camera import Camera
+from motes.renderer.lamps import illuminate
 from motes.renderer.sky import Sky, Sun, shade
 from motes.renderer.solids import Hits, Solids, trace
 from motes.renderer.splat import NO_SOLIDS, Depths
@@ -22,6 +23,8 @@ BLOCK = 8
 """Width of the blocks of pixels whose rays share the first part of their way."""
 
 _HALF = np.float32(0.5)
+_QUARTER = np.float32(0.25)
+_ZERO = np.float32(0)
 _UP = np.array([0.0, 0.0, 1.0], np.float32)
 
 # Four sub-samples of a pixel on a rotated grid: each row and column of a 4 x 4 grid once.
@@ -38,6 +41,35 @@ class Backdrop:
 
     depths: Depths
     """Of the solids, along the axis of the camera."""
+
+    surface: Surface | None = None
+    """What lamps may light; None where there are no solids."""
+
+    def lit(self, lamps: Array) -> Array:
+        """The image with the light of lamps (k, 7) on the solids."""
+        if self.surface is None or not len(lamps):
+            return self.image
+        image = self.image.copy()
+        s = self.surface
+        illuminate(s.position, s.normal, s.color, s.pixel, lamps, image.reshape(-1, 4))
+        return image
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Points of solids that are seen: 4 in succession for each pixel of a silhouette, then one."""
+
+    position: Array
+    """(n, 3) [m]."""
+
+    normal: Array
+    """(n, 3) outward unit normal; 0 where nothing was met."""
+
+    color: Array
+    """(n, 3) what a light of 1 on the point adds to its pixel, through the haze."""
+
+    pixel: NDArray[np.int32]
+    """(n,) row times width plus column."""
 
 
 def backdrop(
@@ -73,7 +105,30 @@ def backdrop(
     forward = camera.axes()[2].astype(np.float32)
     depth = (hits.distance * (rays @ forward)).reshape(height, width)
     samples = (sub_hits.distance * (sub_rays @ forward)).reshape(-1, 4)
-    return Backdrop(image, Depths(depth, edge, samples))
+    whole = np.flatnonzero((edge.ravel() < 0) & (hits.index >= 0))
+    pixels = np.append(np.repeat(row * width + column, 4), whole).astype(np.int32)
+    seen = sub_hits.followed_by(hits.part(whole))
+    ways = np.concatenate([sub_rays, rays[whole]])
+    surface = _surface(camera, ways, seen, pixels, len(sub_rays), sky or Sky(), solids.colors)
+    return Backdrop(image, Depths(depth, edge, samples), surface)
+
+
+def _surface(
+    camera: Camera,
+    rays: Array,
+    hits: Hits,
+    pixels: NDArray[np.int32],
+    quarters: int,
+    sky: Sky,
+    colors: Array,
+) -> Surface:
+    """The points that rays (n, 3) met; the first `quarters` of them are a quarter of a pixel."""
+    distance = np.where(hits.index >= 0, hits.distance, _ZERO)[:, None]
+    seen = np.exp(distance / np.float32(-sky.haze))
+    seen[:quarters] *= _QUARTER
+    seen[hits.index < 0] = 0
+    position = np.asarray(camera.position, np.float32) + distance * rays
+    return Surface(position, hits.normal, seen * colors[hits.index], pixels)
 
 
 def _clear_way(camera: Camera, size: tuple[int, int], solids: Solids) -> Array:

@@ -1,8 +1,8 @@
 """The glow of a lens: a part k of the light is spread by a sum of ever wider kernels.
 
 I' = (1 - k) I + k mean over octaves of U..U D..D I, where D halves the size by the binomial weights
-(1, 3, 3, 1)/8 in x and y and U doubles it by the same weights. Both keep the sum of the light, but
-for what leaves at the border.
+(1, 3, 3, 1)/8 in x and y and U doubles it by the same weights. Both keep the sum of the light. Past
+the border the picture goes on as it is there, so that the glow leaves an even picture even.
 """
 
 from __future__ import annotations
@@ -56,10 +56,7 @@ def _resample(source: Array, target: Array, factor: int, keep: float, gain: floa
 
 
 def _taps(count: int, size: int, factor: int) -> tuple[NDArray[np.int32], Array]:
-    """Source index and weight, (count, 2 factor), of every target pixel along one axis.
-
-    Outside the `size` source pixels it is dark: weight 0.
-    """
+    """Source index within `size` and weight of each target pixel of an axis, (count, 2 factor)."""
     target = np.arange(count)[:, None]
     if factor == 2:
         index = 2 * target + np.arange(-1, 3)
@@ -67,7 +64,6 @@ def _taps(count: int, size: int, factor: int) -> tuple[NDArray[np.int32], Array]
     else:
         index = (target + np.array([-1, 1])) // 2
         weight = np.where(target % 2 == [0, 1], 0.25, 0.75)
-    weight = np.where((index >= 0) & (index < size), weight, 0.0)
     return np.clip(index, 0, size - 1).astype(np.int32), weight.astype(np.float32)
 
 

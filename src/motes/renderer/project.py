@@ -38,6 +38,7 @@ def project(
     velocity: Any,
     color: Any,
     size: Any,
+    lit: Any,
     clip: Any,
     views: Any,
     lens: Any,
@@ -47,7 +48,8 @@ def project(
     """Write one record per particle; R = -1 marks one that is not visible.
 
     views (2, 3, 4) are the cameras at both ends of the shutter. lens holds focal length, width and
-    height [pixels], near, shutter [s], 1/softness, opacity, and per colour the light per alpha.
+    height [pixels], near, shutter [s], 1/softness, opacity, and per colour the light per alpha, to
+    which lamps add `lit` (n, 3) times the opacity, if it has rows.
     """
     focal, width, height, near, shutter = lens[0], lens[1], lens[2], lens[3], lens[4]
     opacity = lens[6]
@@ -112,9 +114,14 @@ def project(
         records[i, 1] = sy
         records[i, 2] = radius
         records[i, 3] = i0
-        records[i, 4] = color[i, 0] * gives * lens[7]
-        records[i, 5] = color[i, 1] * gives * lens[8]
-        records[i, 6] = color[i, 2] * gives * lens[9]
+        red, green, blue = lens[7], lens[8], lens[9]
+        if lit.shape[0] > 0:
+            red += opacity * lit[i, 0]
+            green += opacity * lit[i, 1]
+            blue += opacity * lit[i, 2]
+        records[i, 4] = color[i, 0] * gives * red
+        records[i, 5] = color[i, 1] * gives * green
+        records[i, 6] = color[i, 2] * gives * blue
         records[i, 7] = hides
         if records.shape[1] > 8:
             records[i, 8] = dx

@@ -1,4 +1,4 @@
-"""One frame: backdrop, particles, glow."""
+"""One frame: backdrop, lamps, particles, glow."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from motes.renderer.backdrop import Backdrop, backdrop
 from motes.renderer.bloom import bloom
 from motes.renderer.camera import Camera, Vector
 from motes.renderer.film import Film
+from motes.renderer.lamps import gather
 from motes.renderer.layer import Layer
 from motes.renderer.picture import Picture
 from motes.renderer.sky import Sky
@@ -45,17 +46,21 @@ class Renderer:
             camera: at the opening of the shutter; the backdrop does not blur.
             shutter: how long it is open [s], the length of streaks in time.
             sky: None leaves the picture clear where nothing is.
-            solids: hide and are hidden by particles.
-            light: what particles with opacity scatter per color; None: the light of the sky.
+            solids: hide and are hidden by particles, and are lit by those that shine.
+            light: what particles with opacity scatter per color beside the light of others; None:
+                the light of the sky.
         """
         behind = self._behind(camera, sky, solids)
+        light = light or (sky or Sky()).light
+        lamps = gather(layers, max(light))
         stars = sky.star_layer(camera, self.film.size) if sky else []
         linear = splat(
             [*layers, *stars],
             camera,
-            behind.image,
+            behind.lit(lamps),
             shutter=shutter,
-            light=light or (sky or Sky()).light,
+            light=light,
+            lamps=lamps,
             depths=behind.depths,
         )
         bloom(linear, self.film)

@@ -122,9 +122,14 @@ class Hits:
             np.ones(n, np.float32),
         )
 
-    def part(self, rows: slice) -> Hits:
-        """Views of some rows."""
+    def part(self, rows: slice | NDArray[np.intp]) -> Hits:
+        """Some rows; a slice gives views."""
         return Hits(self.distance[rows], self.normal[rows], self.index[rows], self.lit[rows])
+
+    def followed_by(self, other: Hits) -> Hits:
+        """These rays, then others."""
+        names = ("distance", "normal", "index", "lit")
+        return Hits(*(np.concatenate([getattr(self, k), getattr(other, k)]) for k in names))
 
 
 def trace(

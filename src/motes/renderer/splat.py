@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from motes.jit import blocks, share
 from motes.renderer.camera import Camera, Vector
 from motes.renderer.composite import composite
+from motes.renderer.lamps import scattered
 from motes.renderer.layer import Layer
 from motes.renderer.project import TILE, distribute, project
 
@@ -44,6 +45,9 @@ class Depths:
     """(e, 4) depths within such a pixel."""
 
 
+NO_LAMPS = np.empty((0, 7), np.float32)
+NO_LIGHT = np.empty((0, 3), np.float32)
+
 NO_SOLIDS = Depths(
     np.empty((0, 0), np.float32), np.empty((0, 0), np.int32), np.empty((0, 4), np.float32)
 )
@@ -56,15 +60,18 @@ def splat(
     *,
     shutter: float = 0.0,
     light: Vector = (1.0, 1.0, 1.0),
+    lamps: Array = NO_LAMPS,
     depths: Depths = NO_SOLIDS,
 ) -> Array:
     """Draw layers over a backdrop (h, w, 4), premultiplied; returns (h, w, 4) of the same kind.
 
-    shutter [s] is how long streaks are; light is what matter scatters per color.
+    shutter [s] is how long streaks are; light is what matter scatters per color, and lamps (k, 7)
+    add to it.
     """
     height, width = backdrop.shape[:2]
     across, down = -(-width // TILE), -(-height // TILE)
-    records = _from_near_to_far(_project(layers, camera, (width, height), shutter, light))
+    records = _project(layers, camera, (width, height), shutter, light, lamps)
+    records = _from_near_to_far(records)
     image = np.empty((height, width, 4), np.float32)
     slabs = _slabs(records, across, down)
     for number, slab in enumerate(slabs):
@@ -88,7 +95,12 @@ def splat(
 
 
 def _project(
-    layers: Sequence[Layer], camera: Camera, size: tuple[int, int], shutter: float, light: Vector
+    layers: Sequence[Layer],
+    camera: Camera,
+    size: tuple[int, int],
+    shutter: float,
+    light: Vector,
+    lamps: Array,
 ) -> Array:
     """One record per particle of all layers, (n, 8) or (n, 12)."""
     plain = all(layer.kind != "streaks" and layer.softness <= 0 for layer in layers)
@@ -99,6 +111,8 @@ def _project(
         rows = records[offset : offset + len(layer)]
         offset += len(layer)
         moving = layer.kind == "streaks"
+        lamplit = len(lamps) > 0 and layer.opacity > 0
+        lit = scattered(layer.position, lamps) if lamplit else NO_LIGHT
         lens = np.array(
             [
                 camera.focal(size[1]),
@@ -119,12 +133,13 @@ def _project(
             layer: Layer = layer,
             lens: Array = lens,
             rows: Array = rows,
+            lit: Array = lit,
             moving: bool = moving,
         ) -> None:
             part = slice(*tasks[number])
             clip = np.empty((0, 2), np.float32) if layer.shutter is None else layer.shutter[part]
             columns = (layer.position[part], layer.velocity[part], layer.color[part])
-            project(*columns, layer.size[part], clip, views, lens, moving, rows[part])
+            project(*columns, layer.size[part], lit[part], clip, views, lens, moving, rows[part])
 
         share(task, len(tasks))
     return records
