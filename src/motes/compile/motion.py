@@ -1,8 +1,9 @@
-"""Motion: the right-hand side and one step of one particle, from components and a method's table."""
+"""Motion: the right-hand side and one step of one particle, from components and a table."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 from motes.catalog import Component
 from motes.compile.text import AXES, STATE, Call, Text, packed
@@ -64,7 +65,7 @@ def stage_times(method: Method) -> tuple[float, ...]:
     if isinstance(method, Explicit):
         return method.c
     kicks = method.times
-    middles = [(a + b) / 2 for a, b in zip(kicks, kicks[1:], strict=False)]
+    middles = [(a + b) / 2 for a, b in pairwise(kicks)]
     return tuple(sorted({*kicks, *middles}))
 
 
@@ -129,7 +130,8 @@ class _Writer:
         """`carried`: the flows' velocity; `pushed`: acceleration and relaxation, all forces."""
         arguments = ", ".join(STATE)
         calls = [self._call(address, c, "velocity") for address, c in self.motion.flows]
-        direct, relaxing = [], []
+        direct: list[Call] = []
+        relaxing: list[Call] = []
         for address, c in self.motion.forces:
             for name, found in (("acceleration", direct), ("relaxation", relaxing)):
                 if c.kernel(name) is not None:
@@ -152,22 +154,20 @@ class _Writer:
                 for i, axis in enumerate(AXES, 1)
                 if not call.always_zero(i)
             )
-        self.text.add(
-            f"@inline\ndef pushed{head}{body}    return ax, ay, az, k, bx, by, bz\n"
-        )
+        self.text.add(f"@inline\ndef pushed{head}{body}    return ax, ay, az, k, bx, by, bz\n")
 
     def _slopes(self, i: int, state: tuple[str, ...], share: float) -> str:
         """Source for the slopes k of stage i at a state."""
         call = f"({', '.join(state)}, age + F({share!r}) * h, C, S{i}, L, t{i})"
-        x, y, z, vx, vy, vz = state
+        velocity = state[3:]
         lines = f"    ux{i}, uy{i}, uz{i} = carried{call}\n" if self.motion.flows else ""
         if not self.motion.inertial:
             return lines
-        for axis, v in zip(AXES, (vx, vy, vz), strict=True):
+        for axis, v in zip(AXES, velocity, strict=True):
             flow = f" + u{axis}{i}" if self.motion.flows else ""
             lines += f"    k{axis}{i} = {v}{flow}\n"
         lines += f"    ax{i}, ay{i}, az{i}, r, bx, by, bz = pushed{call}\n"
-        for axis, v in zip(AXES, (vx, vy, vz), strict=True):
+        for axis, v in zip(AXES, velocity, strict=True):
             lines += f"    a{axis}{i} += b{axis} - r * {v}\n"
         return lines
 
@@ -224,9 +224,7 @@ class _Writer:
         age = f"age + F({begin!r}) * h"
         own = {axis: f"v{axis} + " if self.motion.inertial else "" for axis in AXES}
         lines += f"    ux, uy, uz = carried({', '.join(STATE)}, {age}, C, S{first}, L, t{first})\n"
-        lines += "".join(
-            f"    m{a} = {a} + F(0.5) * d * ({own[a]}u{a})\n" for a in AXES
-        )
+        lines += "".join(f"    m{a} = {a} + F(0.5) * d * ({own[a]}u{a})\n" for a in AXES)
         lines += f"    ux, uy, uz = carried(mx, my, mz, vx, vy, vz, {age} + F(0.5) * d, "
         lines += f"C, S{middle}, L, t{middle})\n"
         return lines + "".join(f"    {a} += d * ({own[a]}u{a})\n" for a in AXES)
@@ -249,13 +247,7 @@ class _Writer:
         )
 
 
-
-
 def _combine(start: str, weights: tuple[float, ...], slope: str, axis: str) -> str:
     """`start + h * (w_0 slope_0 + w_1 slope_1 ...)` without the zero terms."""
-    terms = [
-        f"F({float(w)!r}) * {slope}{axis}{j}" for j, w in enumerate(weights) if w != 0
-    ]
+    terms = [f"F({float(w)!r}) * {slope}{axis}{j}" for j, w in enumerate(weights) if w != 0]
     return f"{start} + h * ({' + '.join(terms)})" if terms else start
-
-
