@@ -231,17 +231,19 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                     # Where the spheres do not touch, take the cautious step after all.
                     apart = step > before + abs(d)
                     least = close * t
-                    met = (t < end) & (not apart) & (d - room * t < least)
+                    # A step too long may have led past the end.
+                    on = (t < end) | (apart & (end > _ZERO))
+                    met = on & (not apart) & (d - room * t < least)
                     forth = max((_stride(d, before, step) if not beams else d - room * t), least)
                     # The rest of the way, as the last step would have it of a flat face.
                     rest = min(d * step / max(before - d, _TINY), flat * t)
                     move = before - step if apart else rest if met else forth
-                    lane[a] = t + (move if t < end else _ZERO)
+                    lane[a] = t + (move if on else _ZERO)
                     lane[_STEP + a] = before if apart else forth
                     lane[_BEFORE + a] = before if apart else d
-                    lane[_END + a] = _ZERO if met else end
+                    lane[_END + a] = end if on & (not met) else _ZERO
                     kind[a] = which if met else kind[a]
-                    going += np.int32((t < end) & (not met))
+                    going += np.int32(on & (not met))
                 if going == 0:
                     break
             some = False
@@ -301,18 +303,18 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                 going = np.int32(0)
                 for a in range(LANES):
                     t, light = lane[a], lane[_LIGHT + a]
-                    on = (t < _SHADOW_FAR) & (light > _ZERO)
-                    along = t if on else _ZERO
+                    along = t if t < _NOTHING else _ZERO
                     x, y, z = lane[_FROM + a], lane[_FROM_Y + a], lane[_FROM_Z + a]
                     x, y, z = x + along * setting[5], y + along * setting[6], z + along * setting[7]
                     found, _ = nearest(params, x, y, z)
                     d, before, step = np.float32(found), lane[_BEFORE + a], lane[_STEP + a]
                     apart = step > before + abs(d)
+                    on = (light > _ZERO) & ((t < _SHADOW_FAR) | (apart & (t < _NOTHING)))
                     seen = min(light, sharpness * d / t)
                     seen = _ZERO if seen < _DARK else seen
                     lane[_LIGHT + a] = seen if on & (not apart) else light
                     forth = max(_stride(d, before, step), _CLOSE * width * t)
-                    lane[a] = t + (before - step if apart else forth)
+                    lane[a] = t + (before - step if apart else forth) if on else _NOTHING
                     lane[_STEP + a] = before if apart else forth
                     lane[_BEFORE + a] = before if apart else d
                     going += np.int32(on)
