@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from motes.ode.solution import Crossings, Event, NewtonSolution, Solution, Work
 from motes.ode.solve import solve
+from motes.ode.solve_many import ManySolutions, solve_many
 from motes.ode.solve_newton import solve_newton
 
 __all__ = [
     "Crossings",
     "Event",
+    "ManySolutions",
     "NewtonSolution",
     "Solution",
     "Work",
     "solve",
+    "solve_many",
     "solve_newton",
 ]
