@@ -130,14 +130,18 @@ class Hits:
     """(n,) part of the sun that is seen from there."""
 
     @classmethod
-    def none(cls, n: int) -> Hits:
-        """Rays that met nothing."""
-        return cls(
-            np.full(n, np.inf, np.float32),
-            np.zeros((n, 3), np.float32),
-            np.full(n, -1, np.int32),
-            np.ones(n, np.float32),
-        )
+    def empty(cls, n: int) -> Hits:
+        """Room for n rays; nothing is written yet."""
+        single = np.float32
+        room = np.empty(n, single), np.empty((n, 3), single), np.empty(n, np.int32)
+        return cls(*room, np.empty(n, single))
+
+    def clear(self) -> None:
+        """Make them rays that met nothing."""
+        self.distance.fill(np.inf)
+        self.normal.fill(0)
+        self.index.fill(-1)
+        self.lit.fill(1)
 
     def part(self, rows: slice) -> Hits:
         """Views of some rows."""
