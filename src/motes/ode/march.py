@@ -60,6 +60,9 @@ def partial_step(take: Kernel, wrap: Wrap) -> tuple[Kernel, Kernel]:
 
     @wrap.part
     def inside(share, t, y, k, h, rows, out, args):  # type: ignore[no-untyped-def]
+        if share == 0.0:
+            copy(y, out)
+            return 0
         copy(k[0], rows[0])
         return abs(take(t, y, rows, out, share * h, args))
 

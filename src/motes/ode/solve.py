@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from motes.integrate import table as find
-from motes.ode import explicit, right_hand_side
+from motes.ode import explicit, implicit, right_hand_side
 from motes.ode.arithmetic import Array
+from motes.ode.jacobian import Linearisation, Newton
 from motes.ode.march import Control
 from motes.ode.run import Machine, March, as_events, asked, checked, ends, fixed
 from motes.ode.solution import Event, Solution
-from motes.tableau import Explicit, Nystrom, Splitting, Table
+from motes.tableau import BackwardDifference, Explicit, Implicit, Rosenbrock, Table
 
 Function = Callable[..., Any]
 MOST_STEPS = 100_000_000
@@ -38,6 +39,7 @@ def solve(
     largest_step: float = math.inf,
     max_steps: int = MOST_STEPS,
     dense: bool = True,
+    newton: Newton | None = None,
 ) -> Solution:
     """Solve y' = f(t, y) from y0 over span = (t0, t1), forward or backward.
 
@@ -60,6 +62,7 @@ def solve(
         largest_step: no step is longer, where steps vary.
         max_steps: the solve gives up after as many.
         dense: whether to keep every step, so that the solution can be called with any time.
+        newton: how implicit methods solve their equations.
 
     Returns:
         Times, states, events, work. Where no step can be found, `success` is False, `message` says
@@ -72,13 +75,20 @@ def solve(
     start = np.array(y0, float)
     shape = start.shape
     watched = as_events(events)
-    machine = _machine(f, shape, method, tuple(e.function for e in watched))
     table = find(method)
     tolerances = np.broadcast_to(np.asarray(atol, float), shape).reshape(-1).copy()
     if step is not None:
         control = fixed(span, step, max_steps)
     else:
         control = _adaptive(method, table, span, rtol, tolerances, largest_step, max_steps)
+    functions = tuple(event.function for event in watched)
+    if isinstance(table, Implicit | Rosenbrock | BackwardDifference):
+        near = Linearisation(_flat(f, shape, args), newton or Newton(), tuple(args), start.size)
+        solver = implicit.Solver(near, control.rtol, tolerances if step is None else _unit(start))
+        watch = right_hand_side.watcher(functions, shape, right_hand_side.PLAIN)
+        machine = Machine.build(*implicit.pieces(table, solver), watch, right_hand_side.PLAIN)
+    else:
+        machine = _machine(f, shape, method, functions)
     march = March(
         machine, control, checked(start, "y0"), tolerances, watched, tuple(args),
         asked(at, span), dense or at is None, first_step or 0.0,
@@ -102,9 +112,21 @@ def _machine(
         slope = right_hand_side.slope(f, shape)
         pieces = explicit.pieces(table, slope, wrap)
         return Machine.build(pieces, explicit.space(table), watch, wrap)
-    if isinstance(table, Splitting | Nystrom):
-        raise ValueError(f"\"{method}\" is for x'' = a(t, x): use solve_newton")
-    raise ValueError(f'"{method}" is not here yet')
+    raise ValueError(f"\"{method}\" is for x'' = a(t, x): use solve_newton")
+
+
+def _flat(f: Function, shape: tuple[int, ...], args: tuple[Any, ...]) -> Function:
+    """f of a flat state, for linear algebra."""
+
+    def flat(t: float, y: Array) -> Array:
+        return np.asarray(f(t, y.reshape(shape), *args), float).reshape(-1)
+
+    return flat
+
+
+def _unit(start: Array) -> Array:
+    """Scales for Newton's method where no tolerance is given: the size of the initial state."""
+    return np.full(start.size, max(float(np.abs(start).max(initial=0.0)), 1e-300))
 
 
 def _adaptive(
