@@ -1,0 +1,1 @@
+"""Laws between particles."""

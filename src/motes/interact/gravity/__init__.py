@@ -1,0 +1,1 @@
+"""Gravity between particles: direct sums and the fast multipole method."""
