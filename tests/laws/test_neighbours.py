@@ -1,0 +1,168 @@
+"""Neighbour search: what must hold for any points, without looking at how it is done."""
+
+import numpy as np
+import pytest
+
+import motes.jit
+from motes import neighbours
+
+
+@pytest.fixture
+def cloud():
+    return np.random.default_rng(3).random((20_000, 3))
+
+
+def test_poisson_points_have_the_volume_of_the_ball_as_mean_number_of_pairs(cloud):
+    """E[pairs] = n (n - 1)/2 V(r) in a periodic unit box, with variance equal to that mean."""
+    n, radius = len(cloud), 0.07
+    expected = n * (n - 1) / 2 * 4 / 3 * np.pi * radius**3
+    i, _ = neighbours.pairs(cloud, radius, box=1.0)
+    assert len(i) == pytest.approx(expected, abs=5 * np.sqrt(expected))
+
+
+def test_pairs_are_sorted_and_each_is_there_once(cloud):
+    i, j = neighbours.pairs(cloud, 0.05)
+    assert np.all(i < j)
+    number = i.astype(np.int64) * len(cloud) + j
+    assert np.all(np.diff(number) > 0)
+
+
+def test_every_pair_is_seen_from_both_sides(cloud):
+    """within is symmetric, (i, j) <=> (j, i), and is twice the pairs."""
+    i, j = neighbours.within(cloud, 0.06, box=1.0)
+    order = np.lexsort((i, j))
+    np.testing.assert_array_equal((j[order], i[order]), (i, j))
+    later = i < j
+    np.testing.assert_array_equal((i[later], j[later]), neighbours.pairs(cloud, 0.06, box=1.0))
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_order_of_points_only_renames_rows(cloud, real):
+    x = cloud.astype(real)
+    order = np.random.default_rng(5).permutation(len(x))
+    i, j = neighbours.pairs(x[order], 0.05, box=1.0)
+    a, b = np.minimum(order[i], order[j]), np.maximum(order[i], order[j])
+    sort = np.lexsort((b, a))
+    np.testing.assert_array_equal((a[sort], b[sort]), neighbours.pairs(x, 0.05, box=1.0))
+    index, distance = neighbours.nearest(x, 6)
+    new_index, new_distance = neighbours.nearest(x[order], 6)
+    np.testing.assert_array_equal(new_distance, distance[order])
+    np.testing.assert_array_equal(order[new_index], index[order])
+
+
+def test_threads_change_nothing(cloud):
+    results = []
+    try:
+        for count in (1, 2, 4):
+            motes.jit.threads(count)
+            found = (neighbours.pairs(cloud, 0.05, box=1.0), neighbours.nearest(cloud, 7))
+            results.append(b"".join(array.tobytes() for part in found for array in part))
+    finally:
+        motes.jit.threads(0)
+    assert results[0] == results[1] == results[2]
+
+
+@pytest.mark.parametrize("cells", [1, 2, 3, 4])
+def test_a_lattice_has_its_coordination_shells_in_any_number_of_cells(cells):
+    """Simple cubic, a = 1: 6 neighbours at 1; 12 at sqrt 2; no image counts twice.
+
+    In a box of 2 edges both ways lead to the same neighbour: one of them counts.
+    """
+    edge = 3 * cells
+    x = np.stack(np.meshgrid(*[np.arange(edge)] * 3), axis=-1).reshape(-1, 3).astype(float)
+    for radius, number in ((1.0, 6), (1.5, 18)):
+        i, _ = neighbours.within(x, radius, box=float(edge))
+        assert np.all(np.bincount(i) == number)
+    small = np.stack(np.meshgrid(*[np.arange(2.0)] * 3), axis=-1).reshape(-1, 3)
+    i, _ = neighbours.within(small, 1.0, box=2.0)
+    assert np.all(np.bincount(i) == 3)
+
+
+def test_a_point_at_the_end_of_the_box_is_at_its_beginning():
+    """x = L, x = 0 and x = -1e-30, which rounds to L when it is wrapped, are one place."""
+    x = np.array([[5.0, 1, 1], [0.0, 1, 1], [-1e-30, 1, 1], [4.95, 1, 1]])
+    i, j = neighbours.pairs(x, 0.1, box=5.0)
+    assert list(zip(i, j, strict=True)) == [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
+    _, distance = neighbours.nearest(x, 2, box=5.0)
+    assert np.all(distance[:3] == 0)
+
+
+def test_the_radius_itself_is_within():
+    """|x_i - x_j| = r exactly, on both sides of cells and of the border."""
+    x = np.array([[0.0, 0], [0.25, 0], [0.5, 0], [3.75, 0]])
+    i, j = neighbours.pairs(x, 0.25, box=4.0)
+    assert list(zip(i, j, strict=True)) == [(0, 1), (0, 3), (1, 2)]
+
+
+def test_one_axis_can_be_periodic():
+    x = np.array([[0.1, 0.1, 0.1], [9.9, 0.1, 0.1], [0.1, 9.9, 0.1]])
+    i, j = neighbours.pairs(x, 0.5, box=(10.0, np.inf, np.inf))
+    assert list(zip(i, j, strict=True)) == [(0, 1)]
+
+
+@pytest.mark.parametrize("spread", [1e-300, 1e3, -1e9, -1e30, 1e200])
+def test_a_point_far_away_changes_nothing_for_the_others(cloud, spread):
+    """Cells cost memory and time for points, not for the space between them."""
+    x = np.concatenate([cloud, [[spread, 2.0, 2.0]]])
+    np.testing.assert_array_equal(neighbours.pairs(x, 0.03), neighbours.pairs(cloud, 0.03))
+    index, _ = neighbours.nearest(x, 3)
+    assert index.shape == (len(x), 3)
+
+
+def test_nearest_are_the_closest_of_those_within(cloud):
+    """The k-th distance is the radius of the smallest ball that holds k others."""
+    k = 9
+    _, distance = neighbours.nearest(cloud, k, box=1.0)
+    assert np.all(np.diff(distance, axis=1) >= 0)
+    radius = float(np.sort(distance[:, -1])[-1]) * (1 + 1e-12)
+    i, j = neighbours.within(cloud, radius, box=1.0)
+    apart = np.abs(cloud[i] - cloud[j])
+    apart = np.sqrt((np.minimum(apart, 1 - apart) ** 2).sum(axis=1))
+    closer = np.bincount(i[apart < distance[i, -1] * (1 - 1e-12)], minlength=len(cloud))
+    assert np.all(closer == k - 1)
+
+
+def test_coincident_points_are_neighbours_at_distance_zero():
+    x = np.ones((600, 3))
+    i, _ = neighbours.pairs(x, 1e-6)
+    assert len(i) == 600 * 599 // 2
+    index, distance = neighbours.nearest(x, 2)
+    assert np.all(distance == 0)
+    assert index[0].tolist() == [1, 2]
+    assert index[5].tolist() == [0, 1]
+
+
+@pytest.mark.parametrize("n", [0, 1, 2])
+def test_few_points(n):
+    x = np.arange(3.0 * n).reshape(n, 3)
+    i, j = neighbours.pairs(x, 6.0)
+    assert len(i) == len(j) == n * (n - 1) // 2
+    index, distance = neighbours.nearest(x, 3)
+    assert index.shape == distance.shape == (n, 3)
+    assert np.count_nonzero(index >= 0) == n * (n - 1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (([[0, 0, 0], [1, np.nan, 2]], 1.0), r"x\[1\] = \[1.0, nan, 2.0\] is not finite"),
+        (([[np.inf, 0]], 1.0), r"x\[0\]"),
+        (([1.0, 2.0, 3.0], 1.0), r"x must be \(n, 3\) or \(n, 2\), not \(3,\)"),
+        (([[0, 0, 0]], 0.0), "radius = 0.0 must be above 0"),
+        (([[0, 0, 0]], np.nan), "radius = nan must be above 0"),
+        (([[0, 0, 0]], 1.0, (1.0, 2.0)), "box must be one length or 3"),
+        (([[0, 0, 0]], 1.0, -1.0), "edges above 0"),
+    ],
+)
+def test_bad_points_are_named(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        neighbours.pairs(*arguments)
+
+
+def test_bad_targets_are_named():
+    with pytest.raises(ValueError, match=r"targets\[0\]"):
+        neighbours.within(np.zeros((2, 3)), 1.0, [[np.nan, 0, 0]])
+    with pytest.raises(ValueError, match="as many coordinates"):
+        neighbours.within(np.zeros((2, 3)), 1.0, np.zeros((2, 2)))
+    with pytest.raises(ValueError, match="k = 0"):
+        neighbours.nearest(np.zeros((2, 3)), 0)
