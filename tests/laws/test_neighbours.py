@@ -5,6 +5,7 @@ import pytest
 
 import motes.jit
 from motes import neighbours
+from motes.interact.lists import NeighbourList
 
 
 @pytest.fixture
@@ -166,3 +167,55 @@ def test_bad_targets_are_named():
         neighbours.within(np.zeros((2, 3)), 1.0, np.zeros((2, 2)))
     with pytest.raises(ValueError, match="k = 0"):
         neighbours.nearest(np.zeros((2, 3)), 0)
+
+
+@pytest.mark.parametrize("half", [False, True])
+@pytest.mark.parametrize("box", [None, 1.0])
+def test_a_list_that_is_not_stale_misses_no_pair(half, box):
+    """Until the first point has moved skin / 2, all pairs within the radius are in the list."""
+    rng = np.random.default_rng(7)
+    x = rng.random((2_000, 3))
+    neighbours_of = NeighbourList(0.08, 0.02, box, half=half)
+    x = x[neighbours_of.build(x)]
+    velocity = rng.normal(size=x.shape) * 1e-4
+    steps = 0
+    while not neighbours_of.stale(x):
+        i, j = neighbours.pairs(x, 0.08, box)
+        owner = np.repeat(np.arange(len(x)), np.diff(neighbours_of.first))
+        listed = owner * len(x) + neighbours_of.row
+        assert np.all(np.isin(i.astype(np.int64) * len(x) + j, listed))
+        if not half:
+            assert np.all(np.isin(j.astype(np.int64) * len(x) + i, listed))
+        x = x + velocity
+        steps += 1
+    fastest = np.sqrt((velocity**2).sum(axis=1)).max()
+    assert steps == pytest.approx(0.01 / fastest, abs=1.5)
+
+
+def test_a_list_grows_and_says_so():
+    rng = np.random.default_rng(8)
+    x = rng.random((500, 3))
+    neighbours_of = NeighbourList(0.1, 0.0)
+    neighbours_of.build(x)
+    first, capacity = len(neighbours_of.row), neighbours_of.capacity
+    assert capacity >= first
+    neighbours_of.build(x * 1.01)
+    assert (neighbours_of.growths, neighbours_of.capacity) == (0, capacity)
+    neighbours_of.build(x / 2)
+    assert (neighbours_of.builds, neighbours_of.growths) == (3, 1)
+    assert capacity < len(neighbours_of.row) <= neighbours_of.capacity
+    i, _ = neighbours.within(x / 2, 0.1)
+    assert len(neighbours_of.row) == len(i)
+
+
+def test_a_list_is_stale_before_it_is_built_and_after_births():
+    x = np.random.default_rng(9).random((100, 3))
+    neighbours_of = NeighbourList(0.1, 0.0)
+    assert neighbours_of.stale(x)
+    x = x[neighbours_of.build(x)]
+    assert not neighbours_of.stale(x)
+    assert neighbours_of.stale(x[:99])
+    assert neighbours_of.stale(x + 1e-9)
+    x[7, 1] = np.nan
+    with pytest.raises(ValueError, match=r"x\[7\]"):
+        neighbours_of.stale(x)

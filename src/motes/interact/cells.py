@@ -143,7 +143,9 @@ def grid(bounds: NDArray[np.float64], radius: float, box: NDArray[Any]) -> Grid:
     scale = np.where(folded, 2.0 ** np.floor(-np.log2(width)), 1 / width)
     scale[periodic] = shape[periodic] / period[periodic]
     low = np.where(periodic | folded, 0.0, bounds[0])
-    if np.max(np.abs(bounds) * scale) > np.finfo(np.float64).max / 2:
+    with np.errstate(over="ignore"):
+        farthest = np.max(np.abs(bounds) * scale)
+    if farthest > np.finfo(np.float64).max / 2:
         raise ValueError(f"radius = {radius} m is too small for points {extent.max():.3g} m apart")
     return Grid(low, scale, shape, periodic | folded, box)
 

@@ -194,10 +194,11 @@ def search(
     radius: float,
     who: Who,
     into: NDArray[np.int32] | None = None,
+    spare: float = 1.0,
 ) -> Found:
     """Points within `radius` [m] of targets, which are sorted by the same grid.
 
-    The rows go to `into` if that is large enough, else to a new array.
+    The rows go to `into` if that is large enough, else to a new array, `spare` times what it holds.
     """
     real = cells.position.dtype.type
     limit = square(radius, real)
@@ -226,7 +227,7 @@ def search(
     first = np.zeros(len(count) + 1, np.int64)
     np.cumsum(lengths, dtype=np.int64, out=first[1:])
     if into is None or into.size < first[-1]:
-        into = allocate((int(first[-1]),), np.int32, "a list of neighbours")
+        into = allocate((int(spare * first[-1]),), np.int32, "a list of neighbours")
     row = into
 
     def arrange(part: int) -> None:
