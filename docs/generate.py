@@ -15,6 +15,7 @@ import sys
 import tomllib
 from collections.abc import Iterable, Iterator
 from importlib import import_module
+from inspect import cleandoc
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +144,7 @@ def _commands() -> str:
         context = click.Context(command, info_name=f"motes {name}")
         usage = " ".join(command.collect_usage_pieces(context))
         parts += [f"## motes {name}", f"```text\nmotes {name} {usage}\n```"]
-        parts += [_paragraph(text) for text in (command.help or "").split("\n\n")]
+        parts += [_paragraph(text) for text in cleandoc(command.help or "").split("\n\n")]
         options = [p for p in command.params if isinstance(p, click.Option)]
         records = [record for p in options if (record := p.get_help_record(context))]
         parts.append(_table(("Option", "Meaning"), ((f"`{o}`", _inline(h)) for o, h in records)))
