@@ -95,6 +95,17 @@ def test_the_radius_itself_is_within():
     assert list(zip(i, j, strict=True)) == [(0, 1), (0, 3), (1, 2)]
 
 
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_chain_is_linked_by_its_spacing(axis, real):
+    """x_k = k a: n - 1 pairs within a in open space, n in a box of n a, wherever cells end."""
+    x = np.zeros((400, 3), real)
+    x[:, axis] = np.arange(400) * 0.25
+    i, j = neighbours.pairs(x, 0.25)
+    np.testing.assert_array_equal(j - i, np.ones(399))
+    assert len(neighbours.pairs(x - 17, 0.25, box=100.0)[0]) == 400
+
+
 def test_one_axis_can_be_periodic():
     x = np.array([[0.1, 0.1, 0.1], [9.9, 0.1, 0.1], [0.1, 9.9, 0.1]])
     i, j = neighbours.pairs(x, 0.5, box=(10.0, np.inf, np.inf))
@@ -190,6 +201,17 @@ def test_a_list_that_is_not_stale_misses_no_pair(half, box):
         steps += 1
     fastest = np.sqrt((velocity**2).sum(axis=1)).max()
     assert steps == pytest.approx(0.01 / fastest, abs=1.5)
+
+
+def test_a_list_reaches_through_its_skin_and_lasts_until_half_of_it():
+    """Listed up to r + s; stale as soon as one point has gone s/2, from which two could meet."""
+    radius, skin = 1.0, 0.2
+    for apart, number in ((radius + skin - 1e-9, 1), (radius + skin + 1e-9, 0)):
+        neighbours_of = NeighbourList(radius, skin, half=True)
+        neighbours_of.build(np.array([[0.0, 0, 0], [apart, 0, 0]]))
+        assert len(neighbours_of.row) == number
+    for way, stale in ((0.499 * skin, False), (0.5 * skin, True)):
+        assert neighbours_of.stale(np.array([[0.0, 0, 0], [apart - way, 0, 0]])) == stale
 
 
 def test_a_list_grows_and_says_so():
