@@ -21,6 +21,7 @@ from motes.errors import likely
 from motes.interact.gravity.direct import direct
 from motes.interact.gravity.multipole import multipole
 from motes.interact.gravity.softening import SUPPORT, center_depth
+from motes.interact.gravity.tree import Box
 
 __all__ = ["acceleration", "field", "potential"]
 
@@ -128,13 +129,9 @@ class _Problem:
         self.tolerance = _tolerance(tolerance, self.method, self.dtype)
         self.apart = targets is not None
 
-        both = (position, points)
-        low, high = (
-            np.array([f(p, axis=0, initial=-s) for p in both])
-            for f, s in ((np.min, -np.inf), (np.max, np.inf))
-        )
-        self.low = low.min(axis=0).astype(np.float64)
-        self.length = _power_of_two(float((high.max(axis=0) - self.low).max()))
+        self.low, size = _cube(position, points)
+        self.length = _power_of_two(size)
+        self.cube = size or 1.0
         self.unit_mass = _power_of_two(float(mass.sum()))
         self.position, self.points = position, points
         self.mass = mass / self.unit_mass
@@ -146,25 +143,21 @@ class _Problem:
         if not len(self.points) or not self.mass.any():
             return np.zeros((4, len(self.points)))
         if self.tolerance is None or self._few():
-            rows = (*self._scaled(self.position, 0.0).T, self.mass)
-            source = np.array(rows, self.dtype)
-            target = np.array(self._scaled(self.points, 0.0).T, self.dtype, order="C")
+            source = np.array([*(self.position.T / self.length), self.mass], self.dtype)
+            target = np.array(self.points.T / self.length, self.dtype, order="C")
             return direct(source, target, self.law, self.size, potential)
+        targets = self.points if self.apart else None
+        box = Box(self.low, self.cube, self.length)
         return multipole(
-            self._scaled(self.position, self.low),
-            self.mass,
-            self._scaled(self.points, self.low) if self.apart else None,
-            self.law,
-            self.size,
-            self.tolerance,
-            potential,
+            self.position, self.mass, targets, box, self.law, self.size, self.tolerance, potential
         )
 
     def acceleration(self, sums: NDArray[Any]) -> NDArray[Any]:
         """(k, 3) in the caller's units."""
         unit = self.G * self.unit_mass / self.length / self.length
-        scaled: NDArray[Any] = sums[:3].T * unit
-        return scaled.astype(self.dtype, order="C")
+        result: NDArray[Any] = np.empty((sums.shape[1], 3), self.dtype)
+        np.multiply(sums[:3].T, unit, out=result, casting="same_kind")
+        return result
 
     def potential(self, sums: NDArray[Any]) -> NDArray[Any]:
         """(k,) in the caller's units, without what each particle adds to itself."""
@@ -173,9 +166,6 @@ class _Problem:
             depth = depth - self.mass * center_depth(self.law, self.size)
         scaled: NDArray[Any] = depth * (-self.G * self.unit_mass / self.length)
         return scaled.astype(self.dtype)
-
-    def _scaled(self, points: NDArray[Any], low: NDArray[Any] | float) -> NDArray[np.float64]:
-        return (points.astype(np.float64) - low) / self.length
 
     def _few(self) -> bool:
         """Whether direct sums are asked for, or faster."""
@@ -258,6 +248,16 @@ def _tolerance(tolerance: float | None, method: str, dtype: np.dtype[Any]) -> fl
             f"{precision} precision" + ("; give x as float64." if number < least else ".")
         )
     return number
+
+
+def _cube(*clouds: NDArray[Any]) -> tuple[NDArray[np.float64], float]:
+    """Lowest corner and edge of the cube around points."""
+    columns = [c.T.astype(np.float64, order="C") for c in clouds if len(c)]
+    if not columns:
+        return np.zeros(3), 0.0
+    low = np.min([c.min(axis=1) for c in columns], axis=0)
+    high = np.max([c.max(axis=1) for c in columns], axis=0)
+    return low, float((high - low).max())
 
 
 def _power_of_two(value: float) -> float:

@@ -8,7 +8,7 @@ from motes import gravity
 from motes.interact.gravity.expansions import tables
 from motes.interact.gravity.multipole import Plan, Problem
 from motes.interact.gravity.translations import bench, particles_to_moments
-from motes.interact.gravity.tree import SKIP, X, octree, summarize
+from motes.interact.gravity.tree import SKIP, Box, octree, summarize
 
 
 def distributions(n):
@@ -38,6 +38,10 @@ def distributions(n):
 
 
 NAMES = list(distributions(1))
+
+
+def box(x):
+    return Box(x.min(axis=0), float(np.ptp(x, axis=0).max()), 1.0)
 
 
 def relative(wrong, exact):
@@ -97,7 +101,7 @@ def test_the_error_falls_with_the_order(law):
     errors = []
     for order in range(2, 13):
         plan = Plan(order=order, leaf=16, real=np.float64, opening=0.5)
-        problem = Problem.build(x, m, None, law, size, False, plan)
+        problem = Problem.build(x, m, None, box(x), law, size, False, plan)
         sums = problem.unsorted(problem.solve(problem.limits(np.inf, np.inf, np.inf)))
         errors.append(relative(sums[:3].T, exact))
     assert np.all(np.diff(np.log(errors)) < -np.log(1.5))
@@ -109,7 +113,7 @@ def test_moments_of_every_cell_are_the_sums_over_its_particles(harmonic):
     """Shifted from children to parents, or summed at once: the same to rounding."""
     x, m = plummer_sphere(500)
     table = tables(6, harmonic, np.float64)
-    tree = summarize(octree(x, m, 20), table, np.float64, True)
+    tree = summarize(octree(x, m, box(x), 20), table, np.float64, True)
     work = bench(table, np.float64)
     for cell, (start, end, _) in enumerate(tree.cells):
         center, radius = tree.bodies[cell, :3], tree.bodies[cell, 3]
@@ -126,9 +130,9 @@ def test_moments_of_every_cell_are_the_sums_over_its_particles(harmonic):
 
 def test_a_tree_holds_every_particle_once():
     x, m = distributions(5000)["two clusters"]
-    tree = octree(x, m, 30)
+    tree = octree(x, m, box(x), 30)
     assert np.array_equal(np.sort(tree.order), np.arange(5000))
-    assert np.array_equal(tree.place[X], x[tree.order, 0])
+    assert np.array_equal(tree.place[:3], (x - x.min(axis=0))[tree.order].T)
     leaves = tree.cells[tree.cells[:, SKIP] == np.arange(1, len(tree.cells) + 1)]
     assert leaves[0, 0] == 0
     assert leaves[-1, 1] == 5000

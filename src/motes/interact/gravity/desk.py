@@ -56,7 +56,7 @@ class Desk(NamedTuple):
     target: NDArray[Any]
     """(3, largest leaf) targets as the pair law sees them."""
     source: NDArray[Any]
-    """(5, SOURCES) packed sources: x, y, z, m, and m times the rounding of coordinates."""
+    """(5, SOURCES + lanes) packed sources: x, y, z, m, and m times the rounding of coordinates."""
     spans: NDArray[np.int32]
     """(SOURCES, 2) which particles they are."""
     part: NDArray[Any]
@@ -76,7 +76,7 @@ def desk(table: Tables, real: type, largest: int, capacity: int) -> Desk:
         local=np.empty((_STACK, basis), real),
         gathered=np.empty((basis, LANES), real),
         target=np.zeros((3, width), real),
-        source=np.zeros((5, SOURCES), real),
+        source=np.zeros((5, SOURCES + LANES), real),
         spans=np.empty((SOURCES, 2), np.int32),
         part=np.zeros((5, width), real),
         total=np.zeros((5, width), real),

@@ -27,6 +27,14 @@ if numba.config.DISABLE_JIT:
         """Write lanes into a row of an array."""
         array[row] = lanes
 
+    def read(column: Any, first: int) -> Any:
+        """LANES numbers of a contiguous column from `first` on."""
+        return column[first : first + LANES].copy()
+
+    def write(column: Any, first: int, lanes: Any) -> None:
+        """Write lanes into a contiguous column from `first` on."""
+        column[first : first + LANES] = lanes
+
     def spread(value: Any) -> Any:
         """Lanes that all hold one number."""
         return np.full(LANES, value)
@@ -50,36 +58,34 @@ else:
             element = manager.lookup(lanes.element).get_value_type()
             super().__init__(manager, lanes, ir.VectorType(element, LANES))
 
-    def _row(context: Any, builder: Any, array_type: Any, array: Any, row: Any) -> Any:
-        """Pointer to a row, and the alignment that every row has."""
+    def _place(context: Any, builder: Any, array_type: Any, array: Any, place: Any) -> Any:
+        """Pointer to a row, or to lanes from an element of a column on, and its sure alignment."""
         data = context.make_array(array_type)(context, builder, array).data
-        offset = builder.mul(row, ir.Constant(row.type, LANES))
+        width = LANES if array_type.ndim == 2 else 1
+        offset = builder.mul(place, ir.Constant(place.type, width))
         element = context.get_value_type(array_type.dtype)
         pointer = builder.bitcast(
             builder.gep(data, [offset]), ir.VectorType(element, LANES).as_pointer()
         )
         return pointer, context.get_abi_sizeof(element)
 
-    @intrinsic
-    def load(typing: Any, array: Any, row: Any) -> Any:
-        """Row of an array as lanes."""
-
+    def _load(typing: Any, array: Any, place: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            pointer, align = _row(context, builder, signature.args[0], *arguments)
+            pointer, align = _place(context, builder, signature.args[0], *arguments)
             return builder.load(pointer, align=align)
 
         return Lanes(array.dtype)(array, types.intp), generate
 
-    @intrinsic
-    def store(typing: Any, array: Any, row: Any, lanes: Any) -> Any:
-        """Write lanes into a row of an array."""
-
+    def _store(typing: Any, array: Any, place: Any, lanes: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            pointer, align = _row(context, builder, signature.args[0], *arguments[:2])
+            pointer, align = _place(context, builder, signature.args[0], *arguments[:2])
             builder.store(arguments[2], pointer, align=align)
             return context.get_dummy_value()
 
         return types.void(array, types.intp, lanes), generate
+
+    load = read = intrinsic(_load)
+    store = write = intrinsic(_store)
 
     @intrinsic
     def spread(typing: Any, value: Any) -> Any:

@@ -66,7 +66,7 @@ def _scatter(key: Any, order: Any, shift: Any, place: Any, new_key: Any, new_ord
 
 
 def morton_order(
-    position: NDArray[np.float64], low: NDArray[np.float64], size: float
+    position: NDArray[Any], low: NDArray[np.float64], size: float
 ) -> tuple[NDArray[np.uint64], NDArray[np.uint32]]:
     """Sorted keys and the order that sorts, of positions (n, 3) in a cube at `low`.
 

@@ -20,6 +20,7 @@ from motes.interact.gravity.tree import (
     END,
     SKIP,
     START,
+    Box,
     Tree,
     divide_work,
     largest_leaf,
@@ -27,7 +28,7 @@ from motes.interact.gravity.tree import (
     summarize,
 )
 from motes.interact.gravity.walk import walker
-from motes.jit import share, threads
+from motes.jit import blocks, share, threads
 
 SINGLE_FROM = 4e-6
 """Smallest tolerance that single precision keeps."""
@@ -35,10 +36,10 @@ SINGLE_FROM = 4e-6
 LEAVES = 64
 """Target leaves on which the error is measured before all are computed."""
 
-SAFETY = 0.5
+SAFETY = 0.6
 """Part of the tolerance that the error on the sample may use."""
 
-FIRST = 1.0
+FIRST = 12.0
 """First trial of what one expansion may neglect, in units of the tolerance."""
 
 TRIALS = 8
@@ -58,7 +59,7 @@ class Plan:
     """Most particles in a leaf."""
     real: type
     """Precision of expansions and pairs; places are always in double."""
-    opening: float = 0.9
+    opening: float = 0.95
     """Largest (r_A + r_B) / R at which expansions are used, whatever their estimate."""
 
 
@@ -66,13 +67,14 @@ def plan(tolerance: float) -> Plan:
     """Order, leaf size and precision that are fast at a tolerance, found by measurement."""
     digits = -math.log10(tolerance)
     real = np.float32 if tolerance >= SINGLE_FROM else np.float64
-    return Plan(order=max(2, round(1.6 * digits)), leaf=96, real=real)
+    return Plan(order=max(2, round(1.6 * digits)), leaf=128, real=real)
 
 
 def multipole(
-    source: NDArray[np.float64],
+    source: NDArray[Any],
     mass: NDArray[np.float64],
-    target: NDArray[np.float64] | None,
+    target: NDArray[Any] | None,
+    box: Box,
     law: str,
     size: float,
     tolerance: float,
@@ -80,11 +82,12 @@ def multipole(
 ) -> NDArray[np.float64]:
     """Sums as `direct` gives them, of sources (n, 3) with masses (n,) at targets (k, 3) or sources.
 
-    Returns (4, k). The rms error on a sample of targets is at most half the tolerance, of the
-    accelerations and, with `potential`, of the potential. Lengths and masses should be near 1.
+    Points are in the caller's units and inside of the box; `size` and the result are in those of
+    the box, and the sum of the masses is about 1. Returns (4, k), or (3, k) without `potential`.
+    The rms error on a sample of targets is at most SAFETY times the tolerance, of accelerations
+    and, with `potential`, of potentials.
     """
-    chosen = plan(tolerance)
-    problem = Problem.build(source, mass, target, law, size, potential, chosen)
+    problem = Problem.build(source, mass, target, box, law, size, potential, plan(tolerance))
     return problem.unsorted(problem.solve(problem.limits_for(tolerance)))
 
 
@@ -102,9 +105,10 @@ class Problem:
 
     @staticmethod
     def build(
-        source: NDArray[np.float64],
+        source: NDArray[Any],
         mass: NDArray[np.float64],
-        target: NDArray[np.float64] | None,
+        target: NDArray[Any] | None,
+        box: Box,
         law: str,
         size: float,
         potential: bool,
@@ -112,10 +116,10 @@ class Problem:
     ) -> Problem:
         """Sort the particles into trees and compute the moments."""
         table = tables(plan.order, law != "plummer", plan.real)
-        sources = summarize(octree(source, mass, plan.leaf), table, plan.real, True)
+        sources = summarize(octree(source, mass, box, plan.leaf), table, plan.real, True)
         targets = sources
         if target is not None:
-            tree = octree(target, np.full(len(target), 1 / len(target)), plan.leaf)
+            tree = octree(target, np.full(len(target), 1 / len(target)), box, plan.leaf)
             targets = summarize(tree, table, plan.real, False)
         return Problem(targets, sources, table, law, size, potential, plan)
 
@@ -164,7 +168,14 @@ class Problem:
     def unsorted(self, sums: NDArray[Any]) -> NDArray[np.float64]:
         """Sums in the order in which the targets came."""
         result = np.empty(sums.shape)
-        result[:, self.targets.order] = sums
+        order, ranges = self.targets.order, blocks(sums.shape[1], 1 << 16)
+
+        def scatter(number: int) -> None:
+            low, high = ranges[number]
+            for row in range(len(sums)):
+                result[row, order[low:high]] = sums[row, low:high]
+
+        share(scatter, len(ranges))
         return result
 
     def _walk(self, ranges: list[tuple[int, int]], limits: Limits) -> NDArray[Any]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from motes.interact.gravity.desk import SOURCES, Desk, Limits
-from motes.interact.gravity.lanes import LANES
+from motes.interact.gravity.lanes import LANES, fma, read, spread, write
 from motes.interact.gravity.pairs import attraction
 from motes.interact.gravity.softening import center_depth, pair_law
 from motes.interact.gravity.tree import END, MASS, RADIUS, START, Tree, X, Y, Z
@@ -86,8 +86,11 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
     def sum_near(
         targets: Tree, sources: Tree, same: Any, cell: Any, leaves: Any, limits: Limits, desk: Desk
     ) -> None:
-        cells, bodies, near, old = sources.cells, sources.bodies, targets.near, sources.near
+        cells, bodies, near = sources.cells, sources.bodies, targets.near
         source, target, spans = desk.source, desk.target, desk.spans
+        old_x, old_y, old_z = sources.near[0], sources.near[1], sources.near[2]
+        old_m, new_wrong = sources.near[3], source[4]
+        new_x, new_y, new_z, new_m = source[0], source[1], source[2], source[3]
         kind = source.dtype.type
         x, y, z = targets.bodies[cell, X], targets.bodies[cell, Y], targets.bodies[cell, Z]
         radius = targets.bodies[cell, RADIUS]
@@ -96,6 +99,7 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
         for axis in range(3):
             for i in range(count):
                 target[axis, i] = near[axis, start + i]
+        one, nothing = spread(kind(1)), spread(kind(0))
         packed = pieces = 0
         distance, has_itself = radius, False
         for k in range(leaves.size):
@@ -114,15 +118,16 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
                 taken = min(last - first, SOURCES - packed)
                 distance = max(distance, reach)
                 has_itself = has_itself or itself
-                for axis in range(3):
-                    for i in range(taken):
-                        source[axis, packed + i] = old[axis, first + i] + shift[axis]
-                for i in range(taken):
-                    source[3, packed + i] = old[3, first + i]
-                if single:
-                    wrong = kind(ROUNDING * (reach + radius))
-                    for i in range(taken):
-                        source[4, packed + i] = old[3, first + i] * wrong
+                wrong = spread(kind(ROUNDING * (reach + radius)))
+                # The last lanes may hold more than this leaf; what follows overwrites them.
+                for i in range(0, taken, LANES):
+                    write(new_x, packed + i, fma(read(old_x, first + i), one, spread(shift[0])))
+                    write(new_y, packed + i, fma(read(old_y, first + i), one, spread(shift[1])))
+                    write(new_z, packed + i, fma(read(old_z, first + i), one, spread(shift[2])))
+                    mass = read(old_m, first + i)
+                    write(new_m, packed + i, mass)
+                    if single:
+                        write(new_wrong, packed + i, fma(mass, wrong, nothing))
                 spans[pieces, 0], spans[pieces, 1] = first, first + taken
                 pieces, packed, first = pieces + 1, packed + taken, first + taken
                 if packed == SOURCES:

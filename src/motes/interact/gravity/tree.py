@@ -3,12 +3,14 @@
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motes.interact.gravity.expansions import Tables
+from motes.interact.gravity.lanes import LANES
 from motes.interact.gravity.morton import LEVELS, morton_order
 from motes.interact.gravity.translations import (
     Bench,
@@ -16,10 +18,13 @@ from motes.interact.gravity.translations import (
     moments_to_moments,
     particles_to_moments,
 )
-from motes.jit import jit, share
+from motes.jit import blocks, jit, share
 
 START, END, SKIP = 0, 1, 2
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
+
+LIGHT = 1e-30
+"""Weight of massless particles in a center, where the masses of all are about 1."""
 
 
 class Tree(NamedTuple):
@@ -38,7 +43,7 @@ class Tree(NamedTuple):
     place: NDArray[np.float64]
     """(4, n) x, y, z, m"""
     near: NDArray[Any]
-    """(4, n) for single precision: x, y, z from the leaf's center, m; else `place`."""
+    """(4, n + lanes) x, y, z, m for pairs: in single precision from the leaf's center."""
     moments: NDArray[Any]
     """(cells, basis)"""
 
@@ -87,22 +92,25 @@ def _divide(key: Any, leaf: Any, cells: Any) -> Any:
 
 
 @jit
-def _permute(position: Any, mass: Any, order: Any, place: Any, first: Any, last: Any) -> None:
+def _permute(
+    points: Any, mass: Any, low: Any, length: Any, order: Any, place: Any, first: Any, last: Any
+) -> None:
     for i in range(first, last):
         k = order[i]
-        place[0, i] = position[k, 0]
-        place[1, i] = position[k, 1]
-        place[2, i] = position[k, 2]
+        place[0, i] = (points[k, 0] - low[0]) / length
+        place[1, i] = (points[k, 1] - low[1]) / length
+        place[2, i] = (points[k, 2] - low[2]) / length
         place[3, i] = mass[k]
 
 
 @jit
 def _summarize(
-    tree: Tree, first: Any, last: Any, table: Tables, bench: Bench, shifted: Any, near: bool
+    tree: Tree, first: Any, last: Any, table: Tables, bench: Bench, shifted: Any, relative: bool
 ) -> None:
     """Fill the rows of `bodies` and `moments` of cells `first` to `last`, children before parents.
 
-    `shifted` (4, largest leaf) is working memory; `near`: fill `tree.near` as well.
+    `shifted` (4, largest leaf) is working memory; `relative`: `tree.near` is from
+    the leaf's center.
     """
     cells, bodies, place = tree.cells, tree.bodies, tree.place
     for back in range(last - first):
@@ -110,10 +118,12 @@ def _summarize(
         start, end, skip = cells[cell, START], cells[cell, END], cells[cell, SKIP]
         is_leaf = skip == cell + 1
         mass = x = y = z = 0.0
+        weights = LIGHT * (end - start)
         if is_leaf:
             for i in range(start, end):
                 m = place[3, i]
                 mass += m
+                m += LIGHT
                 x += m * place[0, i]
                 y += m * place[1, i]
                 z += m * place[2, i]
@@ -122,14 +132,13 @@ def _summarize(
             while child < skip:
                 m = bodies[child, MASS]
                 mass += m
+                m += LIGHT * (cells[child, END] - cells[child, START])
                 x += m * bodies[child, X]
                 y += m * bodies[child, Y]
                 z += m * bodies[child, Z]
                 child = cells[child, SKIP]
-        if mass > 0.0:
-            x, y, z = x / mass, y / mass, z / mass
-        else:
-            x, y, z = place[0, start], place[1, start], place[2, start]
+        weights += mass
+        x, y, z = x / weights, y / weights, z / weights
         r2 = 0.0
         for i in range(start, end):
             dx, dy, dz = place[0, i] - x, place[1, i] - y, place[2, i] - z
@@ -145,10 +154,11 @@ def _summarize(
                 shifted[1, i] = place[1, start + i] - y
                 shifted[2, i] = place[2, start + i] - z
                 shifted[3, i] = place[3, start + i]
-            if near:
-                for row in range(4):
-                    for i in range(count):
-                        tree.near[row, start + i] = shifted[row, i]
+            for row in range(4):
+                for i in range(count):
+                    tree.near[row, start + i] = (
+                        shifted[row, i] if relative else place[row, start + i]
+                    )
             if tree.moments.shape[0] > 0:
                 scale = table.factor.dtype.type(1.0 / h)
                 particles_to_moments(table, bench, shifted, count, scale, tree.moments[cell])
@@ -174,42 +184,52 @@ def cell_unit(radius: Any) -> Any:
     return max(radius, 1e-12)
 
 
-def octree(position: NDArray[np.float64], mass: NDArray[np.float64], leaf: int) -> Tree:
+@dataclass(frozen=True)
+class Box:
+    """The cube that a tree divides, and the unit of length inside."""
+
+    low: NDArray[np.float64]
+    """(3,) corner with the smallest coordinates."""
+    size: float
+    """Edge, not 0."""
+    length: float
+    """Unit of length of the tree's coordinates, which are from the corner."""
+
+
+def octree(points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int) -> Tree:
     """Sort and divide particles (n, 3) with masses (n,) until no cell has more than `leaf`.
 
-    Particles that share a key, closer than 2^-21 of the whole, stay in one leaf.
+    Particles that share a key, closer than 2^-21 of the box, stay in one leaf.
     """
-    low = position.min(axis=0)
-    size = float((position.max(axis=0) - low).max()) or 1.0
-    key, order = morton_order(position, low, size)
-    capacity, count = 64 + 4 * len(key) // leaf, 0
+    key, order = morton_order(points, box.low, box.size)
+    n = len(key)
+    capacity, count = 64 + 4 * n // leaf, 0
     while not count:
         capacity *= 2
         cells = np.empty((capacity, 3), np.int32)
         count = _divide(key, leaf, cells)
-    place = np.empty((4, len(key)))
-    size_of_block = 1 << 16
-
-    def permute(block: int) -> None:
-        first = block * size_of_block
-        _permute(position, mass, order, place, first, min(first + size_of_block, len(key)))
-
-    share(permute, -(-len(key) // size_of_block))
+    place = np.empty((4, n))
+    ranges = blocks(n, 1 << 16)
+    share(
+        lambda k: _permute(points, mass, box.low, box.length, order, place, *ranges[k]),
+        len(ranges),
+    )
     nothing = np.empty((0, 0))
-    return Tree(cells[:count].copy(), np.empty((count, 5)), order, place, place, nothing)
+    return Tree(cells[:count].copy(), np.empty((count, 5)), order, place, nothing, nothing)
 
 
 def summarize(tree: Tree, table: Tables, real: type, sources: bool) -> Tree:
     """The tree with bodies, and for `sources` moments, filled in from places and masses."""
     branches, stem = divide_work(tree)
     count = len(tree.cells) if sources else 0
-    near = np.empty(tree.place.shape, real) if real is np.float32 else tree.place
+    near: NDArray[Any] = np.empty((4, tree.place.shape[1] + LANES), real)
+    near[:, -LANES:] = 0
     tree = tree._replace(moments=np.zeros((count, len(table.kept)), real), near=near)
     largest = largest_leaf(tree)
 
     def fill(first: int, last: int) -> None:
         shifted: NDArray[Any] = np.empty((4, largest), real)
-        _summarize(tree, first, last, table, bench(table, real), shifted, near is not tree.place)
+        _summarize(tree, first, last, table, bench(table, real), shifted, real is np.float32)
 
     share(lambda k: fill(branches[k], int(tree.cells[branches[k], SKIP])), len(branches))
     for cell in reversed(stem):
