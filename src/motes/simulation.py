@@ -198,9 +198,14 @@ class Simulation:
             stepper.impacts = impacts[name]
         return state, time
 
-    def frames(self, first: int = 1, last: int | None = None) -> Iterator[Frame]:
-        """Frames of the film, from 1 at time 0, every 1/fps seconds, up to the duration."""
+    def frames(self, first: int | None = None, last: int | None = None) -> Iterator[Frame]:
+        """Frames of the film, every 1/fps seconds from 1 at time 0, up to the duration.
+
+        Without `first` they begin with the first frame that is not before the simulation's time.
+        """
         fps = float(self.scene.film.fps)
+        if first is None:
+            first = 1 + math.ceil(self.time * fps - EDGE)
         if last is None:
             last = self.frame_count
         for index in range(first, last + 1):

@@ -245,3 +245,20 @@ def test_import_of_motes_stays_light() -> None:
     program = "import sys, motes; print([m for m in ('pydantic', 'numba') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.stdout == "[]\n"
+
+
+def test_what_runs_over_life_needs_a_life() -> None:
+    curve = {"over": "life", "keys": [[0, 1], [1, 0]]}
+    with pytest.raises(SceneError, match='system "a": size runs over life'):
+        Scene(systems=[System("a", size=curve)])
+    drag = {"type": "drag", "rate": curve}
+    with pytest.raises(SceneError, match=r'system "a": drag\.rate runs over life'):
+        Scene(systems=[System("a", force=[drag])])
+    Scene(systems=[System("a", size=curve, force=[drag], life=2.0)])
+
+
+def test_a_scene_refuses_methods_that_it_cannot_run() -> None:
+    with pytest.raises(SceneError, match=r'"radau5" works in motes\.ode, but not in a scene'):
+        Scene(integrator="radau5")
+    with pytest.raises(SceneError, match="works in"):
+        Scene(systems=[System("a", integrator="bdf2")])

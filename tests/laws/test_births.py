@@ -197,3 +197,11 @@ def test_digest_does_not_depend_on_how_a_run_is_cut_or_looked_at() -> None:
         cut.step()
         cut.frame(cut.time + 0.0042)
     assert whole.digest() == cut.digest()
+
+
+def test_frames_go_on_where_a_simulation_is() -> None:
+    sim = simulation([motes.emit.Point(rate=100.0)], duration=1.0)
+    sim.run(until=0.5)
+    frames = list(sim.frames())
+    assert [frames[0].index, frames[-1].index] == [13, 24]
+    assert frames[0].time == 0.5

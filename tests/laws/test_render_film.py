@@ -165,3 +165,20 @@ def test_a_contact_sheet_holds_all_stills(tmp_path):
     with Image.open(tmp_path / "sheet.png") as image:
         assert image.size[0] > 3 * 640
         assert image.size[1] > 2 * 420
+
+
+def test_a_still_without_backdrop_keeps_its_transparency(tmp_path):
+    """Over black, the straight colours and alpha of the file give the picture's pixels."""
+    from PIL import Image
+
+    linear = np.zeros((4, 4, 4), np.float32)
+    linear[0, 0] = (0.2, 0.1, 0.05, 0.5)
+    linear[1, 1] = (0.3, 0.0, 0.0, 0.0)
+    picture = Picture(linear, Film(size=(4, 4), bloom=0.0, dither=False))
+    picture.save(tmp_path / "clear.png")
+    read = np.asarray(Image.open(tmp_path / "clear.png")).astype(float)
+    assert read.shape == (4, 4, 4)
+    over_black = read[..., :3] * read[..., 3:] / 255
+    assert np.abs(over_black - picture.pixels).max() <= 1
+    assert read[0, 0, 3] >= 127
+    assert read[3, 3, 3] == picture.pixels[3, 3].max()

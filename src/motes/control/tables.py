@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from motes.errors import likely
+from motes.errors import likely, within
 
 MOST = {"at": 1e9, "count": 1e9, "every": 1e9, "times": 1e5}
 """Keys of a burst and the largest number that each takes."""
@@ -19,10 +19,18 @@ def bursts(value: Any, name: str) -> list[dict[str, float]]:
     if not isinstance(value, list):
         raise ValueError(f"{name} must be a list [{{ at = 0.5, count = 100 }}, ...].")
     result = []
-    for entry in value:
-        if not isinstance(entry, dict) or "count" not in entry:
-            raise ValueError(f"{name}: a burst must be {{ at = seconds, count = particles }}.")
-        for key, number in entry.items():
+    for number, entry in enumerate(value):
+        with within(number):
+            result.append(_burst(entry, name))
+    return result
+
+
+def _burst(entry: Any, name: str) -> dict[str, float]:
+    """One burst with all of its keys."""
+    if not isinstance(entry, dict) or "count" not in entry:
+        raise ValueError(f"{name}: a burst must be {{ at = seconds, count = particles }}.")
+    for key, number in entry.items():
+        with within(key):
             if key not in MOST:
                 raise ValueError(
                     f'{name}: a burst has no key "{key}".{likely(str(key), MOST)} '
@@ -32,14 +40,12 @@ def bursts(value: Any, name: str) -> list[dict[str, float]]:
                 raise ValueError(f"{name}.{key} must be a number, not {str(number)[:40]}.")
             if not 0 <= number <= MOST[key]:
                 raise ValueError(f"{name}.{key} = {number} must be from 0 to {MOST[key]:g}.")
-        burst = {"at": 0.0, "every": 0.0, "times": 1, **entry}
-        for key in ("count", "times"):
-            if burst[key] != int(burst[key]):
-                raise ValueError(f"{name}.{key} = {burst[key]} must be a whole number.")
-        if burst["times"] > 1 and not burst["every"] > 0:
-            raise ValueError(f"{name}: a burst that repeats needs every above 0 s.")
-        result.append(burst)
-    return result
+            if key in ("count", "times") and number != int(number):
+                raise ValueError(f"{name}.{key} = {number} must be a whole number.")
+    burst = {"at": 0.0, "every": 0.0, "times": 1, **entry}
+    if burst["times"] > 1 and not burst["every"] > 0:
+        raise ValueError(f"{name}: a burst that repeats needs every above 0 s.")
+    return burst
 
 
 TABLES: dict[str, Callable[[Any, str], Any]] = {"bursts": bursts}

@@ -32,6 +32,8 @@ class Picture:
     def save(self, path: str | Path) -> None:
         """Write as .png, .webp or .jpg, or the linear light as .npy; all of the file or nothing.
 
+        Where nothing is behind the particles, .png and .webp have an alpha channel.
+
         Raises:
             ValueError: the suffix is none of these.
         """
@@ -46,4 +48,18 @@ class Picture:
             else:
                 from PIL import Image
 
-                Image.fromarray(self.pixels).save(file, formats[suffix], quality=92)
+                clear = suffix in (".png", ".webp") and bool((self.linear[..., 3] < 1 / 512).any())
+                pixels = self._with_alpha() if clear else self.pixels
+                Image.fromarray(pixels).save(file, formats[suffix], quality=92)
+
+    def _with_alpha(self) -> NDArray[np.uint8]:
+        """Straight red, green, blue and alpha that give `pixels` over black.
+
+        Light that covers nothing still needs some alpha to be seen: as much as it is bright.
+        """
+        shown = self.pixels.astype(np.float32) / 255
+        alpha = np.maximum(np.clip(self.linear[..., 3], 0, 1), shown.max(axis=2))
+        straight = shown / np.maximum(alpha, 1 / 255)[..., None]
+        whole = np.concatenate([straight, alpha[..., None]], axis=2)
+        rounded: NDArray[np.uint8] = np.rint(255 * np.clip(whole, 0, 1)).astype(np.uint8)
+        return rounded

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from motes import integrate
 from motes.catalog import Component, find
 from motes.catalog.parameter import quantity
 from motes.control.control import Control
-from motes.errors import Problem
+from motes.control.curve import Curve
+from motes.errors import Problem, SceneError
 from motes.scene import names
 from motes.scene.entry import Entry
-from motes.scene.section import Section
+from motes.scene.section import Section, fault
 from motes.scene.sections import Camera, Film, Sky
 
 Emitters = tuple[Annotated[Component, Entry("emit")], ...]
@@ -32,6 +33,16 @@ _METHODS = tuple(sorted(m.name for m in pkgutil.iter_modules(integrate.__path__)
 def _by_name(parts: tuple[Any, ...]) -> tuple[Any, ...]:
     """Sorted by name, so that the order in a file never matters."""
     return tuple(sorted(parts, key=lambda part: part.name))
+
+
+def _runnable(name: str | None) -> str | None:
+    """A method that scenes can use; only its own table is loaded."""
+    if name is not None:
+        try:
+            integrate.method(name)
+        except SceneError as error:
+            raise fault(str(error.problems[0].message)) from None
+    return name
 
 
 class System(Section):
@@ -77,11 +88,27 @@ class System(Section):
     """Ways to die besides old age."""
 
     _sorted = field_validator(*lists)(_by_name)
+    _runs = field_validator("integrator")(_runnable)
 
     def __init__(self, name: str, **values: Any) -> None:
         super().__init__(name=name, **values)
 
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @model_validator(mode="after")
+    def _lives(self) -> Self:
+        """What runs over life needs a life."""
+        if self.life is None:
+            parts = [part for name in self.lists for part in getattr(self, name)]
+            for owner in (self, *parts):
+                for key, control in owner.values.items():
+                    if isinstance(control, Curve) and control.over == "life":
+                        where = key if owner is self else f"{owner.name}.{key}"
+                        raise fault(
+                            f'system "{self.name}": {where} runs over life, but its particles live '
+                            "for ever. Give it a life, such as life = 2.0 (seconds)."
+                        )
+        return self
 
     @classmethod
     def clashes(cls, values: Mapping[str, Any]) -> list[Problem]:
@@ -157,6 +184,7 @@ class Scene(Section):
     """The particle systems."""
 
     _sorted = field_validator("systems", *lists)(_by_name)
+    _runs = field_validator("integrator")(_runnable)
 
     def __init__(self, **values: Any) -> None:
         # A file says [[system]] for each; Python has them in one list.
