@@ -42,6 +42,7 @@ EXACT = frozenset({"contract"})
 STRICT: frozenset[str] = frozenset()
 """IEEE 754 to the letter: the same bits on any processor of one architecture."""
 
+
 def _use_full_vectors() -> None:
     """Let AVX-512 processors use all of their registers.
 

@@ -198,8 +198,11 @@ def _real(value: float) -> ast.expr:
     """The literal `F(value)`: a number of the scene's precision."""
     text = repr(value)
     if value in (float("inf"), float("-inf")) or value != value:
-        return ast.Call(ast.Name("F", ast.Load()), [ast.Call(
-            ast.Name("float", ast.Load()), [ast.Constant(text)], [])], [])
+        return ast.Call(
+            ast.Name("F", ast.Load()),
+            [ast.Call(ast.Name("float", ast.Load()), [ast.Constant(text)], [])],
+            [],
+        )
     return ast.Call(ast.Name("F", ast.Load()), [ast.Constant(value)], [])
 
 

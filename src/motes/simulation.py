@@ -17,6 +17,7 @@ from motes.diagnose import explain_infinity
 from motes.emission import Clock
 from motes.errors import SceneError, SimulationError, likely
 from motes.frame import Frame
+from motes.group import Group
 from motes.integrate import method
 from motes.scene.address import component_address
 from motes.scene.document import Scene, System
@@ -39,6 +40,7 @@ class Simulation:
         self.scene = scene
         self.start = -scene.prewarm
         self._steppers = {s.name: self._stepper(s) for s in scene.systems}
+        self._groups = self._grouped()
         self._looks = {s.name: Look(s) for s in scene.systems}
         self._systems = {s.name: s for s in scene.systems}
         real = np.float32 if scene.precision == "single" else np.float64
@@ -86,6 +88,33 @@ class Simulation:
         )
         clocks = [Clock(address, emitter, self.start) for address, emitter in emitters]
         return Stepper(compiled, clocks, scene.seed, system.capacity)
+
+    def _grouped(self) -> list[Group]:
+        """Groups of systems that interact, directly or through others."""
+        links = [set(part.values["systems"].document()) for part in self.scene.interact]
+        links = [link or set(self._steppers) for link in links]
+        for part, link in zip(self.scene.interact, links, strict=True):
+            for name in sorted(link - set(self._steppers)):
+                raise SceneError(
+                    f'interaction "{part.name}": no system "{name}".'
+                    f"{likely(name, self._steppers)} There are: {', '.join(self._steppers)}."
+                )
+        groups: list[set[str]] = []
+        for link in links:
+            touching = [group for group in groups if group & link]
+            groups = [group for group in groups if not group & link]
+            groups.append(link.union(*touching))
+        return [
+            Group(
+                {name: self._steppers[name] for name in sorted(group)},
+                tuple(
+                    (component_address(None, part), part)
+                    for part, link in zip(self.scene.interact, links, strict=True)
+                    if link & group
+                ),
+            )
+            for group in groups
+        ]
 
     @property
     def steps(self) -> int:
@@ -164,9 +193,13 @@ class Simulation:
         return (state.number + ahead - self._lead_in) * self.scene.step
 
     def _advance(self, state: State, interval: Interval) -> None:
+        grouped = {name for group in self._groups for name in group.steppers}
         for name in sorted(state.systems):
             self.work += state.systems[name].count
-            self._steppers[name].step(state.systems[name], interval)
+            if name not in grouped:
+                self._steppers[name].step(state.systems[name], interval)
+        for group in self._groups:
+            group.step(state.systems, interval)
         state.number += 1
 
     def _steps_before(self, time: float) -> int:

@@ -9,6 +9,7 @@ another that it could feel.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +64,16 @@ class Stepper:
         self.exceptions(rows, threatened, alive, interval)
         self.events()
         self.deaths(rows, interval)
+
+    def mass(self, rows: Particles, alive: int) -> NDArray[Any]:
+        """Masses [kg] of the rows that were alive, (alive,)."""
+        address, control = self.system.motion.traits["mass"]
+        start = 0
+        for column in self.system.columns:
+            if column.address == address:
+                return rows.columns[start][:alive]
+            start += column.width
+        return np.full(alive, float(control.at(0.0)[0]), rows.real)
 
     def births(self, rows: Particles, interval: Interval) -> None:
         """Append the newborns of the step, as they are at their own instants."""

@@ -33,6 +33,11 @@ class Motion:
         return bool(self.forces) or not self.flows
 
     @property
+    def relaxes(self) -> bool:
+        """Whether any force is a relaxation."""
+        return any(c.kernel("relaxation") for _, c in self.forces)
+
+    @property
     def mortal(self) -> bool:
         """Whether anything retires particles."""
         return bool(self.retire)
@@ -152,9 +157,7 @@ class _Writer:
                 for i, axis in enumerate(AXES, 1)
                 if not call.always_zero(i)
             )
-        self.text.add(
-            f"@inline\ndef pushed{head}{body}    return ax, ay, az, k, bx, by, bz\n"
-        )
+        self.text.add(f"@inline\ndef pushed{head}{body}    return ax, ay, az, k, bx, by, bz\n")
 
     def _slopes(self, i: int, state: tuple[str, ...], share: float) -> str:
         """Source for the slopes k of stage i at a state."""
@@ -210,7 +213,7 @@ class _Writer:
         call = f"({', '.join(STATE)}, age + F({begin!r}) * h, C, S{i}, L, t{i})"
         lines = f"    ax, ay, az, r, bx, by, bz = pushed{call}\n"
         lines += f"    g = F({share!r}) * h\n"
-        if any(c.kernel("relaxation") for _, c in self.motion.forces):
+        if self.motion.relaxes:
             lines += "    g *= phi1(r * g)\n"
         return lines + "".join(
             f"    v{axis} += g * (a{axis} + b{axis} - r * v{axis})\n" for axis in AXES
@@ -224,9 +227,7 @@ class _Writer:
         age = f"age + F({begin!r}) * h"
         own = {axis: f"v{axis} + " if self.motion.inertial else "" for axis in AXES}
         lines += f"    ux, uy, uz = carried({', '.join(STATE)}, {age}, C, S{first}, L, t{first})\n"
-        lines += "".join(
-            f"    m{a} = {a} + F(0.5) * d * ({own[a]}u{a})\n" for a in AXES
-        )
+        lines += "".join(f"    m{a} = {a} + F(0.5) * d * ({own[a]}u{a})\n" for a in AXES)
         lines += f"    ux, uy, uz = carried(mx, my, mz, vx, vy, vz, {age} + F(0.5) * d, "
         lines += f"C, S{middle}, L, t{middle})\n"
         return lines + "".join(f"    {a} += d * ({own[a]}u{a})\n" for a in AXES)
@@ -249,13 +250,7 @@ class _Writer:
         )
 
 
-
-
 def _combine(start: str, weights: tuple[float, ...], slope: str, axis: str) -> str:
     """`start + h * (w_0 slope_0 + w_1 slope_1 ...)` without the zero terms."""
-    terms = [
-        f"F({float(w)!r}) * {slope}{axis}{j}" for j, w in enumerate(weights) if w != 0
-    ]
+    terms = [f"F({float(w)!r}) * {slope}{axis}{j}" for j, w in enumerate(weights) if w != 0]
     return f"{start} + h * ({' + '.join(terms)})" if terms else start
-
-

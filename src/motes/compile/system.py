@@ -18,6 +18,7 @@ from motes.catalog import Component
 from motes.compile.births import Channels, births_kernel, write_draws, write_emitter
 from motes.compile.impacts import currents_kernel, exceptions_kernel, write_flight
 from motes.compile.motion import KEPT, Motion, write_motion
+from motes.compile.staged import write_staged
 from motes.compile.straight import write_straight
 from motes.compile.surfaces import Surfaces, write_surfaces
 from motes.compile.text import Text
@@ -94,6 +95,23 @@ class CompiledSystem:
     def retire(self) -> Any:
         """Kernel: flags the rows that die."""
         return self._fast_module["retire"]
+
+    @cached_property
+    def _staged_module(self) -> tuple[dict[str, Any], Any]:
+        text = Text(self.fast.precision, self._strict)
+        write_motion(text, self.motion)
+        write_staged(text, self.motion)
+        text.add(text.values.scene_text())
+        return text.module(), text.values.arrays(text.real)
+
+    def staged(self, name: str) -> Any:
+        """Kernel `slope`, `kick` or `drift`, for systems that are part of a group."""
+        return self._staged_module[0][name]
+
+    @property
+    def K_staged(self) -> Any:
+        """What the staged kernels read."""
+        return self._staged_module[1]
 
     @cached_property
     def _exact_module(self) -> dict[str, Any]:

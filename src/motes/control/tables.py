@@ -42,4 +42,16 @@ def bursts(value: Any, name: str) -> list[dict[str, float]]:
     return result
 
 
-TABLES: dict[str, Callable[[Any, str], Any]] = {"bursts": bursts}
+def names(value: Any, name: str) -> list[str]:
+    """A list of names of systems.
+
+    Raises ValueError with one line.
+    """
+    if not isinstance(value, list) or not all(isinstance(n, str) and n for n in value):
+        raise ValueError(f'{name} must be a list of names, such as ["stars", "dust"].')
+    if len(set(value)) < len(value):
+        raise ValueError(f"{name} must name each system once.")
+    return value
+
+
+TABLES: dict[str, Callable[[Any, str], Any]] = {"bursts": bursts, "names": names}

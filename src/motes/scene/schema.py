@@ -45,7 +45,7 @@ def schema() -> Schema:
     for shape in _PLAIN:
         definitions |= _forms(shape)
     for kind in KINDS:
-        definitions |= _kind(kind) if kind != "integrate" else {}
+        definitions |= _kind(kind)
     for name, model in (("film", Film), ("camera", Camera), ("sky", Sky)):
         definitions[name] = _section(model)
     definitions["system"] = _section(
