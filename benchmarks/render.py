@@ -8,14 +8,11 @@ installed, which counts points into pixels without any size at all.
 
 from __future__ import annotations
 
-import argparse
-import json
-import time
 from collections.abc import Callable
 
 import numpy as np
+from _report import Report, arguments, best, machine
 
-import motes.jit
 from motes.renderer import Camera, Film, Layer, Renderer, Sky
 from motes.renderer.splat import splat
 
@@ -41,17 +38,6 @@ def cloud(n: int, opacity: float, length: float = 0.0) -> Layer:
         emission=0.0 if opacity else 0.1,
         opacity=opacity,
     )
-
-
-def best(task: Callable[[], object], repeats: int = 5) -> float:
-    """Shortest time of a call [s], the first left out."""
-    task()
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        task()
-        times.append(time.perf_counter() - start)
-    return min(times)
 
 
 def numpy_additive(layer: Layer) -> np.ndarray:
@@ -84,10 +70,10 @@ def datashader_points(layer: Layer) -> Callable[[], object] | None:
     return lambda: canvas.points(frame, "x", "y")
 
 
-def measure() -> dict[str, float]:
+def measure(*, quick: bool) -> dict[str, float]:
     """Millions of particles per second, and milliseconds of a whole frame."""
     clear = np.zeros((HEIGHT, WIDTH, 4), np.float32)
-    n, few = 2_000_000, 200_000
+    n, few = (200_000, 20_000) if quick else (2_000_000, 200_000)
     result = {}
     for name, layer in (
         ("sorted, thin", cloud(n, 0.02)),
@@ -113,25 +99,20 @@ def measure() -> dict[str, float]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
-    result = measure()
-    ratios = {
-        f"additive / {peer}": result["additive"] / result[peer]
-        for peer in ("NumPy, additive", "datashader, counts")
-        if peer in result
-    }
-    threads, frame = motes.jit.threads(), result.pop("frame")
-    if parser.parse_args().json:
-        every = {"threads": threads, "M/s": result, "ratios": ratios, "frame [ms]": frame}
-        print(json.dumps(every, indent=2))
-        return
-    print(f"{WIDTH} x {HEIGHT}, radius {RADIUS} pixels, {threads} threads")
-    for name, rate in result.items():
-        print(f"{name:24} {rate:8.2f} M particles/s")
-    for name, ratio in ratios.items():
-        print(f"{name:40} {ratio:6.1f}")
-    print(f"a frame of 1280 x 720 with 50 000 streaks, sky, glow and tone map: {frame:.1f} ms")
+    options = arguments(__doc__).parse_args()
+    result = measure(quick=options.quick)
+    report = Report(
+        f"{WIDTH} x {HEIGHT}, radius {RADIUS} pixels; M particles/s",
+        machine=machine(("datashader",)),
+    )
+    frame = result.pop("frame")
+    report.figures.update({name: (rate, "M/s") for name, rate in result.items()})
+    report.figures["frame of 1280 x 720, 50 000 streaks, sky, glow, tone map"] = frame, "ms"
+    for peer in ("NumPy, additive", "datashader, counts"):
+        report.ratio("additive", peer)
+    if "datashader, counts" not in result:
+        report.notes.append("datashader is not installed")
+    report.print(options.json)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
 """Run the examples of README.md as they stand there: `python3 tools/readme.py FOLDER`.
 
-FOLDER is new or empty; everything happens in it. Of a fenced block in `toml` or `python` that begins
-with a comment such as `# jet.toml`, this is the file's name. A scene is checked, a script is run, and
-of a block in `sh` every line. Steps that need the project's own folder or change the environment
-(making and entering it, installing, the tests) are left out of a line, and the rest of it is run.
+FOLDER is new or empty; everything happens in it. Of a fenced block in `toml` or `python` that
+begins with a comment such as `# jet.toml`, this is the file's name. A scene is checked, a script is
+run, and of a block in `sh` every line. Steps that need the project's own folder or change the
+environment (making and entering it, installing, the tests) are left out of a line, and the rest of
+it is run.
 """
 
 from __future__ import annotations

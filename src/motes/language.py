@@ -1,9 +1,9 @@
 """From an author's kernel to precise text: literals, names and calls of the kernel language.
 
-A bare `0.5` is a double in machine code and drags single-precision arithmetic with it. `translate`
-takes a kernel's source, gives every literal the scene's precision, turns whole powers into products,
-and finds what the kernel calls: other kernels, elementary functions, constants. The result is
-source text for one function, and the functions that it needs.
+A bare `0.5` is a double in machine code and drags single-precision arithmetic with it. `Translation`
+takes a kernel's source, gives every literal the scene's precision, turns whole powers into
+products, and finds what the kernel calls: other kernels, elementary functions, constants. The
+result is source text for one function, and the functions that it needs.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import builtins
 import types
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from numbers import Number
 from typing import Any
 
 import numpy as np
@@ -179,11 +178,11 @@ class _Rewrite(ast.NodeTransformer):
             return ast.Name(value.__name__, ast.Load())
         if isinstance(value, bool):
             return ast.Constant(value)
-        if isinstance(value, Number) and not isinstance(value, complex):
+        if isinstance(value, int | float | np.integer | np.floating):
             whole = self.whole and isinstance(value, int | np.integer)
-            return ast.Constant(int(value)) if whole else _real(float(value))  # type: ignore[arg-type]
-        if isinstance(value, tuple) and all(isinstance(v, Number) for v in value):
-            return ast.Tuple([_real(float(v)) for v in value], ast.Load())  # type: ignore[arg-type]
+            return ast.Constant(int(value)) if whole else _real(float(value))
+        if isinstance(value, tuple) and all(isinstance(v, int | float | np.number) for v in value):
+            return ast.Tuple([_real(float(v)) for v in value], ast.Load())
         hint = ""
         if name in ELEMENTARY:
             hint = f" Import {name} from motes.kernel."

@@ -25,8 +25,11 @@ LARGEST_BLOCK = 1 << 18
 SMALLEST_BLOCK = 1 << 14
 """Rows below which a second thread costs more than it brings."""
 
+MANY = 2048
+"""Newborns in a step from which a SIMD kernel of their own is worth its compilation."""
+
 WORD = 8
-"""Flags that are looked at together; blocks of rows are multiples of it."""
+"""Flags that are looked at together."""
 
 NOTHING: NDArray[np.int64] = np.zeros(0, np.int64)
 """No rows."""
@@ -60,8 +63,11 @@ class Stepper:
         """Take the system through one step, in place."""
         alive = rows.count
         self.births(rows, interval)
-        threatened = self.integrate(rows, alive, interval)
-        self.exceptions(rows, threatened, alive, interval)
+        exceptional = [
+            self.integrate(rows, alive, interval),
+            self.newborns(rows, alive, interval),
+        ]
+        self.exceptions(rows, np.concatenate(exceptional), interval)
         self.events()
         self.deaths(rows, interval)
 
@@ -113,13 +119,24 @@ class Stepper:
 
     def integrate(self, rows: Particles, alive: int, interval: Interval) -> NDArray[np.int64]:
         """Take the rows that were alive through the step; returns those that may meet a solid."""
+        return self._straight(self.system.straight, rows, 0, alive, interval)
+
+    def newborns(self, rows: Particles, alive: int, interval: Interval) -> NDArray[np.int64]:
+        """Take newborns, if they are many, to the step's end; returns those that need care."""
+        if rows.count - alive < MANY or self.system.young is None:
+            return np.arange(alive, rows.count)
+        return self._straight(self.system.young, rows, alive, rows.count, interval)
+
+    def _straight(
+        self, kernel: Any, rows: Particles, first: int, last: int, interval: Interval
+    ) -> NDArray[np.int64]:
         flags = self._flags(rows)
-        parts = _parts(alive, 1)
+        parts = _parts(last - first, 1)
         found = [NOTHING] * len(parts)
 
         def straight(k: int) -> None:
-            low, high = parts[k]
-            self.system.straight(
+            low, high = first + parts[k][0], first + parts[k][1]
+            kernel(
                 rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
                 interval.begin, interval.length, low, high,
             )  # fmt: skip
@@ -130,11 +147,9 @@ class Stepper:
         return np.concatenate([NOTHING, *found])
 
     def exceptions(
-        self, rows: Particles, threatened: NDArray[np.int64], alive: int, interval: Interval
+        self, rows: Particles, exceptional: NDArray[np.int64], interval: Interval
     ) -> None:
-        """Take newborns from their birth, and threatened rows through impacts, to the end."""
-        newborn = np.arange(alive, rows.count, dtype=np.int64)
-        exceptional = np.concatenate([threatened, newborn])
+        """Take rows from their birth, or the step's begin, through impacts to the step's end."""
         parts = _parts(exceptional.size, 64)
         impacts = [0] * len(parts)
 
@@ -169,8 +184,8 @@ class Stepper:
         rows.keep(flags)
 
     def _flags(self, rows: Particles) -> NDArray[np.uint8]:
-        if self.flags.size < rows.capacity:
-            self.flags = np.zeros(-(-rows.capacity // WORD) * WORD, np.uint8)
+        if self.flags.size < rows.capacity + WORD:
+            self.flags = np.zeros(rows.capacity + WORD, np.uint8)
         return self.flags
 
 
@@ -181,13 +196,13 @@ def _parts(rows: int, cost: int) -> list[tuple[int, int]]:
     a SIMD loop it stands, and must not depend on the number of threads.
     """
     sixteenth = -(-rows * cost // 16)
-    size = min(max(sixteenth, SMALLEST_BLOCK), LARGEST_BLOCK) // cost
-    return blocks(rows, -(-size // WORD) * WORD)
+    return blocks(rows, min(max(sixteenth, SMALLEST_BLOCK), LARGEST_BLOCK) // cost)
 
 
 def _marked(flags: NDArray[np.uint8], low: int, high: int) -> NDArray[np.int64]:
-    """Rows from `low`, a whole number of words, to `high` whose flag is set: few, as a rule."""
-    words = np.flatnonzero(flags[low : -(-high // WORD) * WORD].view(np.uint64))
+    """Rows from `low` to `high` whose flag is set: few, as a rule."""
+    words = np.flatnonzero(flags[low : low - (low - high) // WORD * WORD].view(np.uint64))
     near = (low + words[:, np.newaxis] * WORD + np.arange(WORD)).ravel()
     near = near[flags[near] != 0]
-    return near[: np.searchsorted(near, high)]
+    marked: NDArray[np.int64] = near[: np.searchsorted(near, high)]
+    return marked

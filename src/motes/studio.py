@@ -98,6 +98,8 @@ class Studio:
             emission=_one(look.values["emission"], time),
             opacity=_one(look.values["opacity"], time),
             softness=_one(look.values["softness"], time),
+            trail=_one(look.values["trail"], time) if "trail" in look.values else 0.0,
+            age=columns["age"],
         )
 
     @cached_property

@@ -281,3 +281,19 @@ def test_a_clear_picture_keeps_its_alpha():
     assert picture.linear[32, 32, 3] == pytest.approx(0.5, abs=1e-3)
     assert picture.linear[0, 0].max() == 0
     assert picture.pixels.shape == (SIZE, SIZE, 3)
+
+
+def test_a_trail_shows_the_way_since_birth():
+    """From x - v min(trail, age) to x + v shutter, its light in proportion to that time."""
+
+    def line(age):
+        layer = particles(
+            0, 0, 1.9, velocity=(6, 0, 0), kind="streaks", trail=3.0, age=np.full(1, age)
+        )
+        return draw(layer)[..., 0].sum(axis=0)
+
+    old, young = line(9.0), line(1.0)
+    x = np.arange(SIZE) + 0.5 - SIZE / 2
+    assert (x * old).sum() / old.sum() == pytest.approx(-6.0, abs=0.1)
+    assert (x * young).sum() / young.sum() == pytest.approx(0.0, abs=0.1)
+    assert young.sum() == pytest.approx(0.5 * old.sum(), rel=0.02)

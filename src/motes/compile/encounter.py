@@ -1,10 +1,10 @@
 """Encounters of a path with the solids: the first impact, the bounce, the rest.
 
-Nothing here depends on what moves a particle, so that a change of forces leaves this machine code as
-it is. A path is the cubic Hermite polynomial of a flight that would reach the step's end undisturbed.
-At an impact the velocity is reflected, with restitution and Coulomb friction. Bounces that would be
-shorter than a thousandth of the flight's rest are no longer resolved: the row slides on the surface,
-held by friction (the guard against Zeno's paradox).
+Nothing here depends on what moves a particle, so that a change of forces leaves this machine code
+as it is. A path is the cubic Hermite polynomial of a flight that would reach the step's end
+undisturbed. At an impact the velocity is reflected, with restitution and Coulomb friction. Bounces
+that would be shorter than a thousandth of the flight's rest are no longer resolved: the row slides
+on the surface, held by friction (the guard against Zeno's paradox).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The exceptions pass: rows born in the step, and rows whose path might meet a solid.
 
-One row at a time, in double precision. A row flies from its own beginning to the end of the step; at
-an impact it is reflected and flies on (`compile/encounter.py`).
+One row at a time, in double precision. A row flies from its own beginning to the end of the step;
+at an impact it is reflected and flies on (`compile/encounter.py`).
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Motion: the right-hand side and one step of one particle, from components and a method's table."""
+"""Motion: the right-hand side and one step of one particle, from components and a table."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 from motes.catalog import Component
 from motes.compile.text import AXES, STATE, Call, Text, packed
@@ -69,7 +70,7 @@ def stage_times(method: Method) -> tuple[float, ...]:
     if isinstance(method, Explicit):
         return method.c
     kicks = method.times
-    middles = [(a + b) / 2 for a, b in zip(kicks, kicks[1:], strict=False)]
+    middles = [(a + b) / 2 for a, b in pairwise(kicks)]
     return tuple(sorted({*kicks, *middles}))
 
 
@@ -134,7 +135,8 @@ class _Writer:
         """`carried`: the flows' velocity; `pushed`: acceleration and relaxation, all forces."""
         arguments = ", ".join(STATE)
         calls = [self._call(address, c, "velocity") for address, c in self.motion.flows]
-        direct, relaxing = [], []
+        direct: list[Call] = []
+        relaxing: list[Call] = []
         for address, c in self.motion.forces:
             for name, found in (("acceleration", direct), ("relaxation", relaxing)):
                 if c.kernel(name) is not None:
@@ -162,15 +164,15 @@ class _Writer:
     def _slopes(self, i: int, state: tuple[str, ...], share: float) -> str:
         """Source for the slopes k of stage i at a state."""
         call = f"({', '.join(state)}, age + F({share!r}) * h, C, S{i}, L, t{i})"
-        x, y, z, vx, vy, vz = state
+        velocity = state[3:]
         lines = f"    ux{i}, uy{i}, uz{i} = carried{call}\n" if self.motion.flows else ""
         if not self.motion.inertial:
             return lines
-        for axis, v in zip(AXES, (vx, vy, vz), strict=True):
+        for axis, v in zip(AXES, velocity, strict=True):
             flow = f" + u{axis}{i}" if self.motion.flows else ""
             lines += f"    k{axis}{i} = {v}{flow}\n"
         lines += f"    ax{i}, ay{i}, az{i}, r, bx, by, bz = pushed{call}\n"
-        for axis, v in zip(AXES, (vx, vy, vz), strict=True):
+        for axis, v in zip(AXES, velocity, strict=True):
             lines += f"    a{axis}{i} += b{axis} - r * {v}\n"
         return lines
 

@@ -1,7 +1,7 @@
 """The solids of a scene as functions of a point: `solids` (poses at a time), `near` (distance).
 
-`solids(S)` gives one flat tuple D. Solid k begins at START[k]: position (3), rotation matrix by rows
-(9), restitution, friction, then its own parameters.
+`solids(S)` gives one flat tuple D. Solid k begins at START[k]: position (3), rotation matrix by
+rows (9), restitution, friction, then its own parameters.
 """
 
 from __future__ import annotations
@@ -71,15 +71,21 @@ class Surfaces:
 
 def write_surfaces(text: Text, solids: Sequence[tuple[str, Component]]) -> Surfaces:
     """Write `solids(S)` and `near(D, x, y, z)` into the text."""
-    lines, entries, starts, distances = "", [], [], []
+    lines = ""
+    entries: list[str] = []
+    starts: list[int] = []
+    distances: list[str] = []
     for k, (address, solid) in enumerate(solids):
-        add = lambda key, a=address, s=solid: text.values.add(s.values[key], f"{a}.{key}")  # noqa: E731
+        pose = {
+            key: text.values.add(solid.values[key], f"{address}.{key}")
+            for key in ("position", "rotation", "restitution", "friction")
+        }
         starts.append(len(entries))
         turned = not _is_default(solid, "rotation")
         if turned:
-            lines += _rotation(k, add("rotation"))
+            lines += _rotation(k, pose["rotation"])
         matrix = [f"{name}{k}" for name in MATRIX] if turned else UNTURNED
-        entries += [*add("position"), *matrix, *add("restitution"), *add("friction")]
+        entries += [*pose["position"], *matrix, *pose["restitution"], *pose["friction"]]
         distances.append(_distance(text, solid, address, k, starts[-1], entries, turned))
     text.add(f"@inline\ndef solids(S):\n{lines}    return ({', '.join(entries)},)\n")
     body = "    best, which = solid_0(D, x, y, z), 0\n"

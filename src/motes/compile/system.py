@@ -92,6 +92,11 @@ class CompiledSystem:
         return self._fast_module["straight"]
 
     @property
+    def young(self) -> Any:
+        """Kernel: newborns from their births to the step's end; None where values vary in time."""
+        return self._fast_module.get("young")
+
+    @property
     def retire(self) -> Any:
         """Kernel: flags the rows that die."""
         return self._fast_module["retire"]

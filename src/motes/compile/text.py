@@ -22,7 +22,8 @@ from motes.catalog import Component
 from motes.compile.values import Values
 from motes.control.constant import Constant
 from motes.control.curve import TABLE_SIZE
-from motes.jit import FAST, STRICT, cache_folder, jit, written_whole
+from motes.files import written_whole
+from motes.jit import FAST, STRICT, cache_folder, jit
 from motes.kernel import ELEMENTARY
 from motes.language import Translation, can_fold
 
@@ -89,7 +90,7 @@ class Text:
         """An expression that builds a named tuple with the given expressions as fields."""
         names = tuple(fields)
         kind = f"{name}_{hashlib.sha1(','.join(names).encode()).hexdigest()[:6]}"
-        self.records[kind] = namedtuple(kind, names)  # type: ignore[misc]
+        self.records[kind] = namedtuple(kind, names)
         return f"{kind}({', '.join(fields.values())})"
 
     def add(self, source: str) -> None:

@@ -1,8 +1,8 @@
 """The numbers that kernels read, laid out in a few arrays, and how generated text names them.
 
 A constant is one entry of `constants`, so that changing it compiles nothing. A curve over time is a
-packed spline, evaluated exactly at the time at which it is asked. A value drawn at birth is a column
-of the system. A curve over life or speed is a row of a lookup table.
+packed spline, evaluated exactly at the time at which it is asked. A value drawn at birth is a
+column of the system. A curve over life or speed is a row of a lookup table.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class Values:
         return bool(self.splines)
 
     def arrays(self, real: Any) -> tuple[NDArray[Any], ...]:
-        """K: constants, offsets of the splines, splines, and lookup tables in the given precision."""
+        """K: constants, offsets of the splines, splines, and lookup tables of type `real`."""
         rows = [len(s) for s in self.splines]
         offsets = np.concatenate([[0], np.cumsum(rows)]).astype(np.int64)
         splines = np.concatenate(self.splines or [np.zeros((1, 1))])

@@ -123,7 +123,7 @@ def _surface(
     colors: Array,
 ) -> Surface:
     """The points that rays (n, 3) met; the first `quarters` of them are a quarter of a pixel."""
-    distance = np.where(hits.index >= 0, hits.distance, _ZERO)[:, None]
+    distance: Array = np.where(hits.index >= 0, hits.distance, _ZERO)[:, None]
     seen = np.exp(distance / np.float32(-sky.haze))
     seen[:quarters] *= _QUARTER
     seen[hits.index < 0] = 0

@@ -36,7 +36,8 @@ class Layer:
     """(n,) diameter [m]."""
 
     kind: Kind = "points"
-    """points and sprites stand still; streaks are the average over the way x to x + v shutter."""
+    """points and sprites stand still; streaks are the average over the way from x - v trail to
+    x + v shutter."""
 
     emission: float = 1.0
     """Radiance of the centre per color; 0 for matter that only scatters."""
@@ -50,11 +51,19 @@ class Layer:
     shutter: NDArray[np.float32] | None = None
     """(n, 2) part of the shutter interval in which the particle exists, 0 to 1; None: all of it."""
 
+    trail: float = 0.0
+    """Time before the opening of the shutter whose way a streak shows too [s]."""
+
+    age: NDArray[np.float32] | None = None
+    """(n,) time since birth [s], before which no trail reaches; None: long ago."""
+
     def __post_init__(self) -> None:
         n = len(self.position)
         shapes = {"position": (n, 3), "velocity": (n, 3), "color": (n, 4), "size": (n,)}
         if self.shutter is not None:
             shapes["shutter"] = (n, 2)
+        if self.age is not None:
+            shapes["age"] = (n,)
         for name, shape in shapes.items():
             array: Any = np.ascontiguousarray(getattr(self, name), np.float32)
             if array.shape != shape:

@@ -7,7 +7,7 @@ same bits for any number of threads.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,6 +108,7 @@ def _project(
     views = np.stack([camera.view(), (camera.close or camera).view()])
     offset = 0
     for layer in layers:
+        layer, open_for = _with_trail(layer, shutter)
         rows = records[offset : offset + len(layer)]
         offset += len(layer)
         moving = layer.kind == "streaks"
@@ -118,7 +119,7 @@ def _project(
                 camera.focal(size[1]),
                 *size,
                 camera.near,
-                shutter,
+                open_for,
                 1.0 / max(layer.softness, 1e-20),
                 layer.opacity,
                 *(layer.emission + layer.opacity * channel for channel in light),
@@ -143,6 +144,21 @@ def _project(
 
         share(task, len(tasks))
     return records
+
+
+def _with_trail(layer: Layer, shutter: float) -> tuple[Layer, float]:
+    """The layer as it is drawn by a shutter that opens with its trail, and how long that is."""
+    trail = layer.trail
+    if layer.kind != "streaks" or not trail > 0:
+        return layer, shutter
+    whole = trail + shutter
+    clip = np.tile(np.array([0, 1], np.float32), (len(layer), 1))
+    if layer.shutter is not None:
+        clip[:, 1] = (trail + shutter * layer.shutter[:, 1]) / whole
+    if layer.age is not None:
+        clip[:, 0] = np.maximum(trail - layer.age, 0) / whole
+    position = layer.position - np.float32(trail) * layer.velocity
+    return replace(layer, position=position, shutter=clip, trail=0.0), whole
 
 
 def _pack(records: Array, across: int, down: int) -> tuple[NDArray[np.int64], Array]:
