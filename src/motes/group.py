@@ -6,6 +6,7 @@ momentum and order. Here each stage is evaluated for the whole group before the 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -36,13 +37,14 @@ class Bodies:
 
 @dataclass
 class _Member:
-    """One system of the group during a step: state y (6, n), slopes, and the push (3, n)."""
+    """One system of the group during a step: state y (6, n), push (3, n) and mass (n,)."""
 
     stepper: Stepper
     rows: Particles
     alive: int
     y: NDArray[Any]
     push: NDArray[Any]
+    mass: NDArray[Any]
 
     def store(self) -> None:
         """Write the state back into the particles' columns."""
@@ -82,24 +84,24 @@ class Group:
 
     def step(self, systems: dict[str, Particles], interval: Interval) -> None:
         """Take all systems through one step, in place."""
-        alive = {name: systems[name].count for name in self.steppers}
-        for name, stepper in self.steppers.items():
-            stepper.births(systems[name], interval)
+        alive = {name: s.births(systems[name], interval) for name, s in self.steppers.items()}
         members = {name: self._member(name, systems[name], alive[name]) for name in alive}
         if isinstance(self.method, Splitting):
             self._split(members, interval, self.method)
         else:
             self._runge_kutta(members, interval, self.method)
-        nobody = np.zeros(0, np.int64)
         for name, stepper in self.steppers.items():
             members[name].store()
-            stepper.exceptions(systems[name], nobody, alive[name], interval)
+            newborn = np.arange(alive[name], systems[name].count)
+            stepper.exceptions(systems[name], newborn, interval)
             stepper.events()
             stepper.deaths(systems[name], interval)
 
     def _member(self, name: str, rows: Particles, alive: int) -> _Member:
         y = np.concatenate([rows.position[:, :alive], rows.velocity[:, :alive]])
-        return _Member(self.steppers[name], rows, alive, y, np.zeros((3, alive), rows.real))
+        stepper = self.steppers[name]
+        push, mass = np.zeros((3, alive), rows.real), stepper.mass(rows, alive)
+        return _Member(stepper, rows, alive, y, push, mass)
 
     def _split(self, members: dict[str, _Member], interval: Interval, method: Splitting) -> None:
         h = interval.length
@@ -139,17 +141,44 @@ class Group:
         """Fill every member's push with what the interactions give at a time."""
         for member in members.values():
             member.push[:] = 0
+        bodies = [Bodies(name, m.y[:3], m.mass) for name, m in members.items()]
         for _, interaction in self.interactions:
-            named = interaction.values["systems"].document()
-            chosen = [m for name, m in members.items() if not named or name in named]
-            bodies = [Bodies(m.rows.name, m.y[:3], m.stepper.mass(m.rows, m.alive)) for m in chosen]
-            p = SimpleNamespace(
-                **{key: _plain(interaction, key, time) for key in interaction.parameters}
-            )
-            for member, push in zip(
-                chosen, type(interaction).kernel("accelerations")(p, bodies), strict=True
-            ):
-                member.push += push
+            chosen, p = _partners(interaction, bodies), _values(interaction, time)
+            pushes = _kernel(interaction, "accelerations")(p, chosen)
+            for body, push in zip(chosen, pushes, strict=True):
+                members[body.name].push += push
+
+    def energy(self, systems: dict[str, Particles], time: float) -> float:
+        """Potential energy [J] of the interactions that define one."""
+        bodies = []
+        for name, stepper in self.steppers.items():
+            rows = systems[name]
+            place = rows.position[:, : rows.count]
+            bodies.append(Bodies(name, place, stepper.mass(rows, rows.count)))
+        return sum(
+            float(_kernel(part, "energy")(_values(part, time), _partners(part, bodies)))
+            for _, part in self.interactions
+            if type(part).kernel("energy") is not None
+        )
+
+
+def _kernel(interaction: Component, name: str) -> Callable[..., Any]:
+    function = type(interaction).kernel(name)
+    assert function is not None
+    return function
+
+
+def _partners(interaction: Component, bodies: list[Bodies]) -> list[Bodies]:
+    """The bodies that take part in an interaction."""
+    named = interaction.values["systems"].document()
+    return [body for body in bodies if not named or body.name in named]
+
+
+def _values(interaction: Component, time: float) -> SimpleNamespace:
+    """An interaction's parameters at a time."""
+    return SimpleNamespace(
+        **{key: _plain(interaction, key, time) for key in interaction.parameters}
+    )
 
 
 def _plain(component: Component, key: str, time: float) -> Any:

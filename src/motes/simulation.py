@@ -19,6 +19,7 @@ from motes.errors import SceneError, SimulationError, likely
 from motes.frame import Frame
 from motes.group import Group
 from motes.integrate import method
+from motes.record.energy import Matter, Measures, measure
 from motes.scene.address import component_address
 from motes.scene.document import Scene, System
 from motes.state import Particles, State
@@ -150,6 +151,22 @@ class Simulation:
     def digest(self) -> str:
         """One hash of the whole state: equal digests mean equal bits."""
         return self._state.digest()
+
+    def measure(self) -> Measures:
+        """Energy, momentum, angular momentum and virial ratio of all particles, now.
+
+        Particles that flows alone carry have no motion of their own and do not count.
+        """
+        systems, potential = self._state.systems, 0.0
+        matter = []
+        for name, rows in systems.items():
+            stepper, n = self._steppers[name], rows.count
+            if rows.moves:
+                mass = stepper.mass(rows, n)
+                matter.append(Matter(rows.position[:, :n], rows.velocity[:, :n], mass))
+                potential += float(mass @ stepper.system.potential(rows, self.time))
+        potential += sum(group.energy(systems, self.time) for group in self._groups)
+        return measure(self.time, matter, potential)
 
     def step(self) -> None:
         """Take one step."""

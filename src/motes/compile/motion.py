@@ -65,6 +65,13 @@ def write_motion(text: Text, motion: Motion) -> None:
         writer.dies()
 
 
+def write_potential(text: Text, motion: Motion) -> None:
+    """Write `potential(x, ..., age, C, S, L, t)` [m2/s2], the sum of all forces that have one."""
+    writer = _Writer(text, motion)
+    writer.right_hand_side()  # Registers the system's columns in the order in which it keeps them.
+    writer.potential()
+
+
 def stage_times(method: Method) -> tuple[float, ...]:
     """Times at which the scene's values are needed, as shares of the step."""
     if isinstance(method, Explicit):
@@ -241,6 +248,15 @@ class _Writer:
         self.text.add(
             f"@inline\ndef advance({', '.join(STATE)}, age, C, {scene}, L, {times}, h):\n"
             f"{lines}    return {', '.join(ends)}\n"
+        )
+
+    def potential(self) -> None:
+        """`potential`: potential energy of a unit mass in all forces that have a potential."""
+        having = [(a, c) for a, c in self.motion.forces if c.kernel("potential")]
+        calls = [self._call(address, c, "potential").source for address, c in having]
+        self.text.add(
+            f"@inline\ndef potential({', '.join(STATE)}, age, C, S, L, t):\n{self._preamble()}"
+            f"    return {' + '.join(calls) or 'F(0.0)'}\n"
         )
 
     def dies(self) -> None:

@@ -19,7 +19,7 @@ from motes.compile.births import Channels, births_kernel, write_draws, write_emi
 from motes.compile.impacts import currents_kernel, exceptions_kernel, write_flight
 from motes.compile.motion import KEPT, Motion, write_motion
 from motes.compile.staged import write_staged
-from motes.compile.straight import write_straight
+from motes.compile.straight import write_potentials, write_straight
 from motes.compile.surfaces import Surfaces, write_surfaces
 from motes.compile.text import Text
 from motes.compile.threat import write_threat
@@ -128,6 +128,19 @@ class CompiledSystem:
         return exceptions_kernel(
             self._exact_module, self.solid.module(), self.motion, self.surfaces
         )
+
+    def potential(self, particles: Particles, time: float) -> NDArray[np.float64]:
+        """Potential (n,) [m2/s2] of the forces that have one, at each particle."""
+        result = np.zeros(particles.count)
+        if any(force.kernel("potential") for _, force in self.motion.forces):
+            text = Text("double", self._strict)
+            write_potentials(text, self.motion)
+            text.add(text.values.scene_text())
+            text.module()["potentials"](
+                particles.position, particles.velocity, particles.birth, particles.columns,
+                text.values.arrays(np.float64), time, result, 0, particles.count,
+            )  # fmt: skip
+        return result
 
     def carried(self, particles: Particles, time: float) -> NDArray[np.float64]:
         """Velocity (n, 3) [m/s] that the flows give to particles that have none of their own."""

@@ -2,7 +2,8 @@
 
 An interaction that is a global law, such as gravity, defines `accelerations(p, bodies)`: from the
 positions and masses of all systems that take part, an array (3, n) [m/s2] for each of them. Systems
-that share an interaction are one group and take every stage of a step together.
+that share an interaction are one group and take every stage of a step together. It may define
+`energy(p, bodies)`, their potential energy [J].
 """
 
 from __future__ import annotations
