@@ -4,6 +4,8 @@ import numpy as np
 import warp as wp
 from _report import best
 
+wp.config.quiet = True
+
 STEP, RATE, CORE, STRENGTH = (wp.constant(wp.float32(v)) for v in (1e-3, 0.1, 0.1, 2.0))
 
 
@@ -32,7 +34,6 @@ def step(position: wp.array(dtype=wp.vec3), velocity: wp.array(dtype=wp.vec3)):
 
 def speed(n: int, threads: int) -> float:
     """Millions of particle-steps per second; `threads` cannot be heeded."""
-    wp.config.quiet = True
     wp.init()
     start = np.random.default_rng(0).normal(size=(n, 3)).astype(np.float32)
     with wp.ScopedDevice("cpu"):

@@ -96,7 +96,9 @@ def _fields(fields: Iterable[Field]) -> str:
 
 def _facts(field: Field) -> tuple[str, str, str]:
     """Default, unit, and range without the unit."""
-    default = "none" if field.default is None else f"`{json.dumps(field.default)}`"
+    value = field.default
+    endless = isinstance(value, float) and value >= 1e6
+    default = "none" if value is None else f"`{value:g}`" if endless else f"`{json.dumps(value)}`"
     bare = field.range.replace(f" {field.unit}", "") if field.unit else field.range
     return default, field.unit, MENU_PAGES.get(field.name, bare)
 

@@ -276,7 +276,7 @@ def _fingerprint(function: Callable[..., Any], seen: frozenset[int] = frozenset(
     known = _plain_fingerprint.get(id(function))
     if known is not None and known[0] is function:
         return known[1]
-    parts: list[str] = [function.__module__]
+    parts = [str(function.__module__)]
     scopes = [function.__globals__]
     if function.__closure__:
         names = function.__code__.co_freevars

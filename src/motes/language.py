@@ -1,8 +1,8 @@
 """From an author's kernel to precise text: literals, names and calls of the kernel language.
 
-A bare `0.5` is a double in machine code and drags single-precision arithmetic with it. `Translation`
-takes a kernel's source, gives every literal the scene's precision, turns whole powers into
-products, and finds what the kernel calls: other kernels, elementary functions, constants. The
+A bare `0.5` is a double in machine code and drags single-precision arithmetic with it.
+`Translation` takes a kernel's source, gives every literal the scene's precision, turns whole powers
+into products, and finds what the kernel calls: other kernels, elementary functions, constants. The
 result is source text for one function, and the functions that it needs.
 """
 
@@ -24,6 +24,11 @@ from motes.source import function_node
 
 BUILTINS = frozenset({"min", "max", "abs", "range", "bool", "len"})
 """Python's own functions that the kernel language has."""
+
+MENU = (
+    "Kernels use arithmetic, numbers, other @kernel functions and "
+    f"{', '.join(sorted(ELEMENTARY))} of motes.kernel."
+)
 
 INTEGER_CALLS = frozenset({"range", "uint32", "int32", "uint64", "int64"})
 """Calls whose literal arguments stay whole numbers."""
@@ -165,7 +170,7 @@ class _Rewrite(ast.NodeTransformer):
             return self.global_value(node, node.id, self.scope[node.id])
         if node.id in BUILTINS and hasattr(builtins, node.id):
             return node
-        raise self.fail(node, f'name "{node.id}" is not known.')
+        raise self.fail(node, f'name "{node.id}" is not known. {MENU}')
 
     def global_value(self, node: ast.AST, name: str, value: Any) -> ast.expr:
         if isinstance(value, Elementary):
@@ -188,8 +193,7 @@ class _Rewrite(ast.NodeTransformer):
             hint = f" Import {name} from motes.kernel."
         raise self.fail(
             node,
-            f'"{name}" cannot be used in a kernel.{hint} Kernels use arithmetic, numbers, other '
-            f"@kernel functions and {', '.join(sorted(ELEMENTARY))} of motes.kernel.",
+            f'"{name}" cannot be used in a kernel.{hint} {MENU}',
         )
 
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motes.appearance import Look
 from motes.catalog import Component, find
@@ -268,23 +267,10 @@ class Simulation:
     def check(self) -> None:
         """Raise SimulationError when a particle became infinite or not a number."""
         for name, particles in self._state.systems.items():
-            row = _first_not_finite(particles)
+            row = particles.first_not_finite()
             if row is not None:
                 raise SimulationError(explain_infinity(self, name, row))
 
     def forces(self, system: str) -> tuple[tuple[str, Component], ...]:
         """Addresses and components of the forces on a system, in the order of their sum."""
         return self._steppers[system].system.motion.forces
-
-
-def _first_not_finite(particles: Particles) -> int | None:
-    parts: list[NDArray[Any]] = [particles.position[:, : particles.count]]
-    if particles.moves:
-        parts.append(particles.velocity[:, : particles.count])
-    for block in parts:
-        # A sum is infinite or NaN when an element is, and needs no temporary array.
-        if not np.isfinite(block.sum(dtype=np.float64)):
-            bad = ~np.isfinite(block).all(axis=0)
-            if bad.any():
-                return int(np.argmax(bad))
-    return None

@@ -87,6 +87,18 @@ class Particles:
         self.count -= gone
         return gone
 
+    def first_not_finite(self) -> int | None:
+        """The first row whose position or velocity is infinite or not a number, or None."""
+        rows = [*self.position, *(self.velocity if self.moves else ())]
+        found = [self.count] * len(rows)
+
+        def search(k: int) -> None:
+            found[k] = _first_not_finite(rows[k][: self.count])
+
+        share(search, len(rows))
+        first = min(found)
+        return first if first < self.count else None
+
     def copy(self) -> Particles:
         """An independent copy of the rows that are alive, with room for births."""
         twin = object.__new__(Particles)
@@ -126,3 +138,16 @@ def _compact(array, dead, first, count):  # type: ignore[no-untyped-def]
         if dead[i] == 0:
             array[free] = array[i]
             free += 1
+
+
+@jit
+def _first_not_finite(array):  # type: ignore[no-untyped-def]
+    """Index of the first element that is infinite or not a number, or the size."""
+    bad = 0
+    for i in range(array.size):  # Counting is SIMD, a search is not.
+        bad += not abs(array[i]) < np.inf
+    if bad:
+        for i in range(array.size):
+            if not abs(array[i]) < np.inf:
+                return i
+    return array.size

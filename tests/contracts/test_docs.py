@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import runpy
 import shlex
@@ -93,6 +94,21 @@ def test_the_readme_shows_what_a_mistake_says() -> None:
     with pytest.raises(motes.SceneError) as error:
         loads(scene.text.replace("rate = 0.3", "rat = 0.3"), source=scene.name)
     assert str(error.value) == line.text.rstrip("\n")
+
+
+def test_the_force_that_contributors_start_from_joins_the_catalog(tmp_path: Path) -> None:
+    """Its text as `force/spring.py`: the file's place says kind and type."""
+    page = tool["blocks"]((ROOT / "CONTRIBUTING.md").read_text("utf-8"))
+    path = tmp_path / "spring.py"
+    path.write_text(next(block.text for block in page if block.language == "python"), "utf-8")
+    spec = importlib.util.spec_from_file_location("motes.force.spring", path)
+    assert spec is not None
+    assert spec.loader is not None
+    try:
+        spec.loader.exec_module(importlib.util.module_from_spec(spec))
+        assert motes.force.Spring(stiffness=2.0).document() == {"type": "spring", "stiffness": 2.0}
+    finally:
+        catalog._forget("force", "spring")
 
 
 @pytest.mark.parametrize("page", ALL_PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())

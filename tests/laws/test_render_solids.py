@@ -187,3 +187,27 @@ def test_behind_a_plane_there_is_no_sun():
     sky = replace(Sky.plain((0.1, 0.1, 0.1)), sun=Sun(direction=(0, -1, -0.1), glow=0.0), haze=1e6)
     solids = Solids(ball, PARAMS[:4], np.ones((2, 3)), GROUND)
     assert backdrop(CAMERA, SIZE, sky, solids).image[..., :3].max() == pytest.approx(0.1, rel=1e-3)
+
+
+def test_a_ray_that_has_passed_one_solid_meets_the_next():
+    """However far a step beyond a near ball leads, the far one behind it is not missed."""
+    far = np.array([40.0, 300.0, 0.0, 100.0])
+
+    @jit(inline=True)
+    def two(p, x, y, z):
+        near, _ = ball(p, x, y, z)
+        dx, dy, dz = x - p[4], y - p[5], z - p[6]
+        behind = np.sqrt(dx * dx + dy * dy + dz * dz) - p[7]
+        return min(near, behind), 0 if near < behind else 1
+
+    params = np.append([0.0, 0.0, 0.0, 1.5], far).astype(np.float32)
+    camera = Camera(position=(0, -8, 0), look_at=(0, 0, 0))
+    solids = Solids(two, params, COLORS[:2])
+    index = backdrop(camera, SIZE, Sky(), solids).views[0].hits.index
+    x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
+    rays = camera.rays(x.ravel(), y.ravel(), SIZE).astype(float)
+    offset = np.array(camera.position) - far[:3]
+    inside = (rays @ offset) ** 2 - offset @ offset + far[3] ** 2
+    pixel = 1000.0  # m2: a ray that passes within half a pixel counts as a hit
+    assert (index[inside > 0.0] >= 0).all()
+    assert (index[inside < -pixel] <= 0).all()

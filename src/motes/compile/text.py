@@ -20,7 +20,7 @@ import numpy as np
 
 from motes.catalog import Component
 from motes.compile.values import Values
-from motes.control.constant import Constant
+from motes.control.constant import Constant, Setting
 from motes.control.curve import TABLE_SIZE
 from motes.files import written_whole
 from motes.jit import FAST, STRICT, cache_folder, jit
@@ -74,7 +74,7 @@ class Text:
         """
         function = component.kernel(name)
         assert function is not None
-        known = _defaults(component) if can_fold(function) else {}
+        known = _known(component) if can_fold(function) else {}
         written = [k for k in component.parameters if k in component.own and k not in known]
         owner = f'{component.kind.noun} "{component.type}"'
         kernel = self.translation.add(function, owner, known)
@@ -129,12 +129,15 @@ class Text:
         return scope
 
 
-def _defaults(component: Component) -> dict[str, tuple[float, ...]]:
-    """Own parameters that have their default value, which becomes part of the machine code."""
-    found = {}
+def _known(component: Component) -> dict[str, tuple[float, ...]]:
+    """Own parameters that become part of the machine code: settings, and what has its default."""
+    found: dict[str, tuple[float, ...]] = {}
     for key in component.own:
         control, parameter = component.values[key], component.parameters[key]
-        if isinstance(control, Constant) and control == parameter.control(parameter.default):
+        if isinstance(control, Setting):
+            if isinstance(control.value, int | float):
+                found[key] = (float(control.value),)
+        elif isinstance(control, Constant) and control == parameter.control(parameter.default):
             found[key] = tuple(float(v) for v in control.values)
     return found
 

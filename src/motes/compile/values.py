@@ -72,7 +72,8 @@ class Values:
         value at its birth.
         """
         if isinstance(control, Setting):
-            return [repr(control.value)]
+            value = control.value
+            return [repr(value) if isinstance(value, bool) else f"F({float(value)!r})"]
         if isinstance(control, Constant):
             return [self.constant(v) for v in control.values]
         if isinstance(control, Curve) and control.over == "time" and not at_birth:

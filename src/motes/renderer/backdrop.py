@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,20 +17,50 @@ from motes.renderer.splat import NO_SOLIDS, Depths
 
 Array = NDArray[np.float32]
 
-RAYS = 1 << 15
-"""Rays per task: some milliseconds."""
+RAYS = 1 << 14
+"""Rays per task: some milliseconds, and little enough to stay in the processor's cache."""
 
 BLOCK = 8
 """Width of the blocks of pixels whose rays share the first part of their way."""
 
 _HALF = np.float32(0.5)
-_QUARTER = np.float32(0.25)
-_ZERO = np.float32(0)
 _UP = np.array([0.0, 0.0, 1.0], np.float32)
 
 # Four sub-samples of a pixel on a rotated grid: each row and column of a 4 x 4 grid once.
-_SUB_X = np.array([0.375, 0.875, 0.625, 0.125])
-_SUB_Y = np.array([0.125, 0.375, 0.875, 0.625])
+_SUB_X = np.array([0.375, 0.875, 0.625, 0.125], np.float32)
+_SUB_Y = np.array([0.125, 0.375, 0.875, 0.625], np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What a camera shows at points x, y of a picture [pixels]."""
+
+    camera: Camera
+    size: tuple[int, int]
+    x: Array
+    y: Array
+    hits: Hits
+    depth: Array
+    """(n,) distance along the camera's axis [m]."""
+    color: Array
+    """(n, 4) premultiplied linear light."""
+
+    def add_light(self, lamps: Array, colors: Array, haze: float, out: Array) -> None:
+        """Add the light of lamps (k, 7) on solids of `colors`, through the haze, to out (n, 4)."""
+        tasks = blocks(len(self.x), RAYS)
+        origin = np.asarray(self.camera.position, np.float32)
+
+        def task(number: int) -> None:
+            rows = slice(*tasks[number])
+            hits = self.hits.part(rows)
+            solid = np.flatnonzero(hits.index >= 0)
+            distance = hits.distance[solid, None]
+            rays = self.camera.rays(self.x[rows][solid], self.y[rows][solid], self.size)
+            seen = colors[hits.index[solid]] * np.exp(distance / np.float32(-haze))
+            light = illuminate(origin + distance * rays, hits.normal[solid], lamps)
+            out[rows.start + solid, :3] += seen * light
+
+        share(task, len(tasks))
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,34 +73,23 @@ class Backdrop:
     depths: Depths
     """Of the solids, along the axis of the camera."""
 
-    surface: Surface | None = None
-    """What lamps may light; None where there are no solids."""
+    views: tuple[View, View] | None = None
+    """Of all pixels, and of 4 points in succession in each of the `edges`; None without solids."""
 
-    def lit(self, lamps: Array) -> Array:
-        """The image with the light of lamps (k, 7) on the solids."""
-        if self.surface is None or not len(lamps):
+    edges: tuple[NDArray[np.intp], NDArray[np.intp]] | None = None
+    """Row and column of the pixels on silhouettes and creases."""
+
+    def lit(self, lamps: Array, colors: Array, haze: float) -> Array:
+        """The image with the light of lamps (k, 7) on the solids, which have `colors`."""
+        if self.views is None or not len(lamps):
             return self.image
         image = self.image.copy()
-        s = self.surface
-        illuminate(s.position, s.normal, s.color, s.pixel, lamps, image.reshape(-1, 4))
+        whole, parts = self.views
+        whole.add_light(lamps, colors, haze, image.reshape(-1, 4))
+        light = parts.color.copy()
+        parts.add_light(lamps, colors, haze, light)
+        image[self.edges] = light.reshape(-1, 4, 4).mean(axis=1)
         return image
-
-
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """Points of solids that are seen: 4 in succession for each pixel of a silhouette, then one."""
-
-    position: Array
-    """(n, 3) [m]."""
-
-    normal: Array
-    """(n, 3) outward unit normal; 0 where nothing was met."""
-
-    color: Array
-    """(n, 3) what a light of 1 on the point adds to its pixel, through the haze."""
-
-    pixel: NDArray[np.int32]
-    """(n,) row times width plus column."""
 
 
 def backdrop(
@@ -85,66 +105,43 @@ def backdrop(
     width, height = size
     if sky is None and solids is None:
         return Backdrop(np.zeros((height, width, 4), np.float32), NO_SOLIDS)
-    y, x = np.divmod(np.arange(width * height, dtype=np.int32), width)
-    rays = camera.rays(x + _HALF, y + _HALF, size)
-    near = np.full(len(rays), camera.near, np.float32)
-    clear = near if solids is None else _clear_way(camera, size, solids)
-    hits, color = _look(camera, rays, near, clear, height, sky, solids)
-    image = color.reshape(height, width, 4)
+    x, y = _centers(width, height, 1)
     if solids is None:
-        return Backdrop(image, NO_SOLIDS)
-    row, column = np.nonzero(_edges(hits, size, solids.bent))
-    sub_x = (column[:, None] + _SUB_X).ravel()
-    sub_y = (row[:, None] + _SUB_Y).ravel()
-    sub_rays = camera.rays(sub_x, sub_y, size)
-    near = np.full(len(sub_rays), camera.near, np.float32)
-    sub_hits, sub_color = _look(camera, sub_rays, near, near, height, sky, solids)
-    image[row, column] = sub_color.reshape(-1, 4, 4).mean(axis=1)
+        whole = _look(camera, size, x, y, np.broadcast_to(np.float32(0), len(x)), sky, None)
+        return Backdrop(whole.color.reshape(height, width, 4), NO_SOLIDS)
+    whole = _look(camera, size, x, y, _clear_way(camera, size, solids), sky, solids)
+    row, column = np.nonzero(_edges(whole.hits, size, solids.bent))
+    x, y = (column[:, None] + _SUB_X).ravel(), (row[:, None] + _SUB_Y).ravel()
+    clear = np.full(len(x), camera.near, np.float32)
+    parts = _look(camera, size, x.astype(np.float32), y.astype(np.float32), clear, sky, solids)
+    image = whole.color.reshape(height, width, 4)
+    image[row, column] = parts.color.reshape(-1, 4, 4).mean(axis=1)
     edge = np.full((height, width), -1, np.int32)
     edge[row, column] = np.arange(len(row))
-    forward = camera.axes()[2].astype(np.float32)
-    depth = (hits.distance * (rays @ forward)).reshape(height, width)
-    samples = (sub_hits.distance * (sub_rays @ forward)).reshape(-1, 4)
-    whole = np.flatnonzero((edge.ravel() < 0) & (hits.index >= 0))
-    pixels = np.append(np.repeat(row * width + column, 4), whole).astype(np.int32)
-    seen = sub_hits.followed_by(hits.part(whole))
-    ways = np.concatenate([sub_rays, rays[whole]])
-    surface = _surface(camera, ways, seen, pixels, len(sub_rays), sky or Sky(), solids.colors)
-    return Backdrop(image, Depths(depth, edge, samples), surface)
+    depths = Depths(whole.depth.reshape(height, width), edge, parts.depth.reshape(-1, 4))
+    return Backdrop(image, depths, (whole, parts), (row, column))
 
 
-def _surface(
-    camera: Camera,
-    rays: Array,
-    hits: Hits,
-    pixels: NDArray[np.int32],
-    quarters: int,
-    sky: Sky,
-    colors: Array,
-) -> Surface:
-    """The points that rays (n, 3) met; the first `quarters` of them are a quarter of a pixel."""
-    distance: Array = np.where(hits.index >= 0, hits.distance, _ZERO)[:, None]
-    seen = np.exp(distance / np.float32(-sky.haze))
-    seen[:quarters] *= _QUARTER
-    seen[hits.index < 0] = 0
-    position = np.asarray(camera.position, np.float32) + distance * rays
-    return Surface(position, hits.normal, seen * colors[hits.index], pixels)
+@lru_cache(maxsize=4)
+def _centers(width: int, height: int, step: int) -> tuple[Array, Array]:
+    """Middles of squares of `step` pixels, row by row [pixels]."""
+    y, x = np.divmod(np.arange(width * height, dtype=np.int32), width)
+    return (x + _HALF) * np.float32(step), (y + _HALF) * np.float32(step)
 
 
 def _clear_way(camera: Camera, size: tuple[int, int], solids: Solids) -> Array:
     """Distance up to which no bent solid is near a pixel's ray, (h w,), found for blocks."""
     width, height = size
     across, down = -(-width // BLOCK), -(-height // BLOCK)
-    y, x = np.divmod(np.arange(across * down, dtype=np.int32), across)
-    rays = camera.rays((x + _HALF) * BLOCK, (y + _HALF) * BLOCK, size)
-    hits = Hits.none(len(rays))
-    near = np.full(len(rays), camera.near, np.float32)
-    tasks = blocks(len(rays), RAYS // BLOCK)
+    x, y = _centers(across, down, BLOCK)
+    hits = Hits.none(len(x))
+    near = np.full(len(x), camera.near, np.float32)
+    tasks = blocks(len(x), RAYS // BLOCK)
     reach = BLOCK * 0.7072 / camera.focal(height)
 
     def task(number: int) -> None:
         rows = slice(*tasks[number])
-        ways = (camera.position, rays[rows], near[rows])
+        ways = (camera.position, camera.rays(x[rows], y[rows], size), near[rows])
         trace(solids, *ways, reach, _UP, 0.0, hits.part(rows), beams=True)
 
     share(task, len(tasks))
@@ -154,25 +151,25 @@ def _clear_way(camera: Camera, size: tuple[int, int], solids: Solids) -> Array:
 
 def _look(
     camera: Camera,
-    rays: Array,
-    near: Array,
+    size: tuple[int, int],
+    x: Array,
+    y: Array,
     clear: Array,
-    height: int,
     sky: Sky | None,
     solids: Solids | None,
-) -> tuple[Hits, Array]:
-    """What rays (n, 3) meet beyond `near`, and their light and coverage (n, 4).
-
-    Bent solids are looked for beyond `clear` only.
-    """
-    hits = Hits.none(len(rays))
-    color = np.ones((len(rays), 4), np.float32)
+) -> View:
+    """What is seen at points x, y of a picture; bent solids are looked for beyond `clear` only."""
+    n = len(x)
+    hits = Hits.none(n)
+    depth = np.full(n, np.inf, np.float32)
+    color = np.ones((n, 4), np.float32)
     lamp = sky or Sky()
     numbers = lamp.numbers()
     softness = (lamp.sun or Sun()).softness
-    tasks = blocks(len(rays), RAYS)
+    tasks = blocks(n, RAYS)
     colors = np.zeros((1, 3), np.float32) if solids is None else solids.colors
-    width = 1.0 / camera.focal(height)
+    width = 1.0 / camera.focal(size[1])
+    forward = camera.axes()[2].astype(np.float32)
     sun = numbers[4]
     if lamp.sun is None or (solids is not None and solids.hide(sun)):
         sun = np.zeros(3, np.float32)
@@ -180,19 +177,20 @@ def _look(
     def task(number: int) -> None:
         rows = slice(*tasks[number])
         some = hits.part(rows)
+        rays = camera.rays(x[rows], y[rows], size)
         if solids is not None:
-            solids.meet_planes(camera.position, rays[rows], near[rows], some)
-            ways = (camera.position, rays[rows], clear[rows])
-            trace(solids, *ways, width, sun, softness, some)
+            solids.meet_planes(camera.position, rays, camera.near, some)
+            trace(solids, camera.position, rays, clear[rows], width, sun, softness, some)
             if some.index.max(initial=-1) >= len(colors):
                 raise ValueError(f"solid {some.index.max()} has no colour; there are {len(colors)}")
+            depth[rows] = some.distance * (rays @ forward)
         surface = (some.distance, some.normal, some.index, some.lit)
-        shade(rays[rows], *surface, colors, numbers, color[rows])
+        shade(rays, *surface, colors, numbers, color[rows])
+        if sky is None:
+            color[rows][some.index < 0] = 0.0
 
     share(task, len(tasks))
-    if sky is None:
-        color[np.isinf(hits.distance)] = 0.0
-    return hits, color
+    return View(camera, size, x, y, hits, depth, color)
 
 
 def _edges(hits: Hits, size: tuple[int, int], bent: int) -> NDArray[np.bool_]:
@@ -203,18 +201,18 @@ def _edges(hits: Hits, size: tuple[int, int], bent: int) -> NDArray[np.bool_]:
     width, height = size
     index = hits.index.reshape(height, width)
     near = 1.0 / hits.distance.reshape(height, width)
-    normal = hits.normal.reshape(height, width, 3)
     edges = np.zeros((height, width), np.bool_)
-    for first, second in (
-        (np.s_[:, :-1], np.s_[:, 1:]),
-        (np.s_[:-1], np.s_[1:]),
+    for first, second, apart in (
+        (np.s_[:, :-1], np.s_[:, 1:], 1),
+        (np.s_[:-1], np.s_[1:], width),
     ):
         differs = index[first] != index[second]
-        differs |= np.einsum("...k,...k", normal[first], normal[second]) < 0.8
-        differs &= np.maximum(index[first], index[second]) >= 0
+        row, column = np.nonzero(~differs & (index[first] >= 0) & (index[first] < bent))
+        one = row * width + column
+        folded = np.einsum("ik,ik->i", hits.normal[one], hits.normal[one + apart]) < 0.8
         # On a flat face 1/distance changes evenly, so only a jump counts.
         jump = np.abs(near[first] - near[second]) > 0.1 * np.maximum(near[first], near[second])
-        differs |= jump & (index[first] < bent)
+        differs[row, column] = folded | jump[row, column]
         edges[first] |= differs
         edges[second] |= differs
     return edges

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,11 +48,7 @@ class Camera:
 
         Where the view is along `up`, or `look_at` is the position, any upright direction serves.
         """
-        forward = _unit(np.subtract(self.look_at, self.position), (0.0, 1.0, 0.0))
-        fallback = np.eye(3)[np.argmin(np.abs(forward))]
-        side = np.cross(forward, _unit(np.asarray(self.up, float), (0.0, 0.0, 1.0)))
-        right = _unit(side, _unit(np.cross(forward, fallback), (1.0, 0.0, 0.0)))
-        return np.stack([right, np.cross(right, forward), forward])
+        return _axes(self.position, self.look_at, self.up)
 
     def view(self) -> NDArray[np.float32]:
         """World to camera coordinates, (3, 4): rows right, up, forward; the last column shifts."""
@@ -68,12 +65,23 @@ class Camera:
     ) -> NDArray[np.float32]:
         """Unit directions in the world through the points x, y [pixels] of a picture, (n, 3)."""
         f = self.focal(size[1])
-        right, up, forward = self.axes().astype(np.float32)
-        slope_x = ((x - size[0] / 2.0) / f).astype(np.float32)[:, None]
-        slope_y = ((size[1] / 2.0 - y) / f).astype(np.float32)[:, None]
-        rays = forward + slope_x * right + slope_y * up
-        rays /= np.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
-        return np.ascontiguousarray(rays, np.float32)
+        slopes = np.ones((len(x), 3), np.float32)
+        slopes[:, 0] = (x - size[0] / 2.0) / f
+        slopes[:, 1] = (size[1] / 2.0 - y) / f
+        slopes /= np.sqrt(np.einsum("ik,ik->i", slopes, slopes))[:, None]
+        rays: NDArray[np.float32] = slopes @ self.axes().astype(np.float32)
+        return rays
+
+
+@lru_cache(maxsize=8)
+def _axes(position: Vector, look_at: Vector, up: Vector) -> NDArray[np.float64]:
+    forward = _unit(np.subtract(look_at, position), (0.0, 1.0, 0.0))
+    fallback = np.eye(3)[np.argmin(np.abs(forward))]
+    side = np.cross(forward, _unit(np.asarray(up, float), (0.0, 0.0, 1.0)))
+    right = _unit(side, _unit(np.cross(forward, fallback), (1.0, 0.0, 0.0)))
+    axes = np.stack([right, np.cross(right, forward), forward])
+    axes.flags.writeable = False
+    return axes
 
 
 def _unit(

@@ -21,7 +21,7 @@ from motes.renderer.layer import Layer
 Array = NDArray[np.float32]
 
 ROWS = 1 << 15
-"""Points per task: some milliseconds. A multiple of 4, so that a pixel's samples stay together."""
+"""Particles per task: some milliseconds."""
 
 DIM = 1 / 256
 """Lamps give, at their own spread, at least this part of the light that is there without them."""
@@ -65,31 +65,26 @@ def _of(layer: Layer) -> list[NDArray[np.float64]]:
 
 def scattered(position: Array, lamps: Array) -> Array:
     """What lamps give to matter at positions (n, 3), per colour (n, 3)."""
-    light = np.zeros_like(position)
-    rows = np.arange(len(position), dtype=np.int32)
-    illuminate(position, np.empty((0, 3), np.float32), np.ones_like(position), rows, lamps, light)
-    return light
-
-
-def illuminate(
-    position: Array, normal: Array, color: Array, row: NDArray[np.int32], lamps: Array, out: Array
-) -> None:
-    """Add the light of lamps on points (n, 3), times their colour, to the rows of `out`.
-
-    Equal rows must follow each other within 4 points. Without normals the points are matter.
-    """
-    lamps = np.ascontiguousarray(lamps.T)
+    light = np.empty_like(position)
     tasks = blocks(len(position), ROWS)
 
     def task(number: int) -> None:
-        part = slice(*tasks[number])
-        _illuminate(position[part], normal[part], color[part], row[part], lamps, out)
+        rows = slice(*tasks[number])
+        light[rows] = illuminate(position[rows], np.empty((0, 3), np.float32), lamps)
 
     share(task, len(tasks))
+    return light
+
+
+def illuminate(position: Array, normal: Array, lamps: Array) -> Array:
+    """The light of lamps on surfaces at (n, 3), or without normals on matter there, (n, 3)."""
+    light = np.empty((len(position), 3), np.float32)
+    _illuminate(position, normal, np.ascontiguousarray(lamps.T), light)
+    return light
 
 
 @jit
-def _illuminate(position: Any, normal: Any, color: Any, row: Any, lamps: Any, out: Any) -> None:
+def _illuminate(position: Any, normal: Any, lamps: Any, out: Any) -> None:
     surface = normal.shape[0] > 0
     for i in range(position.shape[0]):
         x, y, z = position[i, 0], position[i, 1], position[i, 2]
@@ -106,6 +101,4 @@ def _illuminate(position: Any, normal: Any, color: Any, row: Any, lamps: Any, ou
             red += part * lamps[4, k]
             green += part * lamps[5, k]
             blue += part * lamps[6, k]
-        out[row[i], 0] += color[i, 0] * red
-        out[row[i], 1] += color[i, 1] * green
-        out[row[i], 2] += color[i, 2] * blue
+        out[i, 0], out[i, 1], out[i, 2] = red, green, blue

@@ -53,11 +53,14 @@ class Renderer:
         behind = self._behind(camera, sky, solids)
         light = light or (sky or Sky()).light
         lamps = gather(layers, max(light))
+        image = behind.image
+        if sky and solids:
+            image = behind.lit(lamps, solids.colors, sky.haze)
         stars = sky.star_layer(camera, self.film.size) if sky else []
         linear = splat(
             [*layers, *stars],
             camera,
-            behind.lit(lamps),
+            image,
             shutter=shutter,
             light=light,
             lamps=lamps,

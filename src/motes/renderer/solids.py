@@ -30,9 +30,26 @@ _TINY = np.float32(1e-30)
 _DARK = np.float32(1 / 64)
 _NOTHING = np.float32(np.inf)
 _CLOSE = np.float32(0.5)
+_TENTH = np.float32(0.1)
+_NINE_TENTHS = np.float32(0.9)
 _SHADOW_FAR = np.float32(50)
 _STEPS = 160
 _SHADOW_STEPS = 40
+
+LANES = np.uint64(16)
+"""Rays that are followed at once."""
+
+# Rows of lanes: the way so far is the first; then its end, or the light that is left; the last
+# step, and the distance where it began; where the ray starts, its direction, the normal of what it
+# met. Unsigned, because an index that may be negative keeps a loop from becoming SIMD.
+_END, _STEP, _BEFORE = (np.uint64(row) * LANES for row in (1, 2, 3))
+_LIGHT = _END
+_FROM, _FROM_Y, _FROM_Z = (np.uint64(row) * LANES for row in (4, 5, 6))
+_ALONG, _ALONG_Y, _ALONG_Z = (np.uint64(row) * LANES for row in (7, 8, 9))
+_NORMAL, _NORMAL_Y, _NORMAL_Z = (np.uint64(row) * LANES for row in (10, 11, 12))
+_AXES = np.uint64(3)
+_SINGLE = np.uint64(1)
+_ALL = np.uint64(13) * LANES
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +100,7 @@ class Solids:
         """Whether a plane is between everything and a far light in the direction `sun` (3,)."""
         return bool((self.planes[:, :3] @ sun < 0).any())
 
-    def meet_planes(self, position: Vector, rays: Array, near: Array, into: Hits) -> None:
+    def meet_planes(self, position: Vector, rays: Array, near: float, into: Hits) -> None:
         """Write where rays (n, 3) meet planes beyond `near` and before `into.distance`."""
         for index, (x, y, z, offset) in enumerate(self.planes, self.bent):
             normal = np.array([x, y, z])
@@ -91,9 +108,9 @@ class Solids:
             with np.errstate(all="ignore"):
                 distance = -height / (rays @ normal)
             met = (height > 0) & (distance > near) & (distance < into.distance)
-            into.distance[met] = distance[met]
-            into.normal[met] = normal
-            into.index[met] = index
+            np.copyto(into.distance, distance, where=met)
+            np.copyto(into.normal, normal, where=met[:, None])
+            np.copyto(into.index, index, where=met)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,14 +139,9 @@ class Hits:
             np.ones(n, np.float32),
         )
 
-    def part(self, rows: slice | NDArray[np.intp]) -> Hits:
-        """Some rows; a slice gives views."""
+    def part(self, rows: slice) -> Hits:
+        """Views of some rows."""
         return Hits(self.distance[rows], self.normal[rows], self.index[rows], self.lit[rows])
-
-    def followed_by(self, other: Hits) -> Hits:
-        """These rays, then others."""
-        names = ("distance", "normal", "index", "lit")
-        return Hits(*(np.concatenate([getattr(self, k), getattr(other, k)]) for k in names))
 
 
 def trace(
@@ -158,9 +170,23 @@ def trace(
     _tracer(solids.nearest)(solids.params, setting, rays, near, beams, *hits)
 
 
+@jit(inline=True)
+def _stride(d: Any, before: Any, step: Any) -> Any:
+    """How far to go from a point at the distance d, when the step that led here began at `before`.
+
+    On a flat face the largest step whose spheres still touch; 0.9 of what that is beyond d.
+    """
+    fall = before - d
+    beyond = max(step - fall, _ZERO) / max(step + fall, _TENTH * step + _TINY)
+    return d + (_NINE_TENTHS * d * beyond if step > _ZERO else _ZERO)
+
+
 @cache
 def _tracer(nearest: Callable[..., Any]) -> Any:
-    """The tracing kernel of one distance function."""
+    """The tracing kernel of one distance function.
+
+    It takes `LANES` rays at a time, and the loops over them, which have no branches, become SIMD.
+    """
 
     @jit
     def trace_rays(
@@ -175,76 +201,125 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
         lit: Any,
     ) -> None:
         width, sharpness = setting[3], setting[4]
-        for i in range(rays.shape[0]):
-            t, end = near[i], min(distance[i], _FAR)
-            x, y, z = setting[0], setting[1], setting[2]
-            dx, dy, dz = rays[i, 0], rays[i, 1], rays[i, 2]
-            # Two ways, one after the other: from the eye, then from what it met to the sun.
-            step, before, light = _ZERO, _ZERO, _ONE
-            shadow, arrived = False, not t < end
-            tries = 0
-            while tries < _STEPS:
-                if arrived:
-                    t = distance[i]
-                    nx, ny, nz = normal[i, 0], normal[i, 1], normal[i, 2]
-                    if not nx * setting[5] + ny * setting[6] + nz * setting[7] > _ZERO:
-                        light = _ZERO
-                    if beams or light == _ZERO or t > _FAR:
-                        break
-                    e = width * t
-                    x, y, z = x + t * dx + e * nx, y + t * dy + e * ny, z + t * dz + e * nz
-                    dx, dy, dz = setting[5], setting[6], setting[7]
-                    t, step, before, tries = np.float32(2) * e, _ZERO, _ZERO, _STEPS - _SHADOW_STEPS
-                    shadow, arrived = True, False
-                tries += 1
-                found, which = nearest(params, x + t * dx, y + t * dy, z + t * dz)
-                d = np.float32(found)
-                if step > before + abs(d):
-                    # The spheres do not touch: take the cautious step after all.
-                    t += before - step
-                    step = before
-                    continue
-                forth = d
-                if shadow:
-                    light = min(light, sharpness * d / t)
-                    if t > _SHADOW_FAR:
-                        break
-                    if light < _DARK:
-                        light = _ZERO
-                        break
-                elif t > end:
-                    arrived = True
-                    continue
-                elif beams:
-                    forth -= width * t
-                    if forth < width * t:
-                        distance[i] = t
-                        break
-                elif d < _CLOSE * width * t:
+        # A beam reaches a surface where that is nearer than its own radius, and it goes in steps
+        # that leave this much room.
+        room = width if beams else _ZERO
+        close = width if beams else _CLOSE * width
+        flat = np.float32(0 if beams else 16) * width
+        lane = np.empty(_ALL, np.float32)  # One array: its parts do not overlap.
+        kind = np.empty(LANES, np.int32)
+        count: Any = np.uint64(rays.shape[0])
+        for group in range((count + LANES - _SINGLE) // LANES):
+            first = group * LANES
+            many = min(count - first, LANES)
+            for a in range(LANES):
+                i = first + min(a, many - _SINGLE)
+                kind[a] = -1
+                lane[a], lane[_END + a] = near[i], min(distance[i], _FAR)
+                lane[_STEP + a], lane[_BEFORE + a] = _ZERO, _ZERO
+                for k in range(_AXES):
+                    lane[_FROM + k * LANES + a] = setting[k]
+                    lane[_ALONG + k * LANES + a] = rays[i, k]
+            for _ in range(_STEPS):
+                going = np.int32(0)
+                for a in range(LANES):
+                    t, end = lane[a], lane[_END + a]
+                    dx, dy, dz = lane[_ALONG + a], lane[_ALONG_Y + a], lane[_ALONG_Z + a]
+                    x, y, z = lane[_FROM + a], lane[_FROM_Y + a], lane[_FROM_Z + a]
+                    found, which = nearest(params, x + t * dx, y + t * dy, z + t * dz)
+                    d, before, step = np.float32(found), lane[_BEFORE + a], lane[_STEP + a]
+                    # Where the spheres do not touch, take the cautious step after all.
+                    apart = step > before + abs(d)
+                    least = close * t
+                    # A step too long may have led past the end.
+                    on = (t < end) | (apart & (end > _ZERO))
+                    met = on & (not apart) & (d - room * t < least)
+                    forth = max((_stride(d, before, step) if not beams else d - room * t), least)
                     # The rest of the way, as the last step would have it of a flat face.
-                    t += min(d * step / max(before - d, _TINY), np.float32(16) * width * t)
-                    distance[i] = t
-                    index[i] = which
-                    px, py, pz = x + t * dx, y + t * dy, z + t * dz
-                    # Central differences on the corners of a tetrahedron.
-                    e = width * t
-                    a, _ = nearest(params, px + e, py - e, pz - e)
-                    b, _ = nearest(params, px - e, py - e, pz + e)
-                    c, _ = nearest(params, px - e, py + e, pz - e)
-                    f, _ = nearest(params, px + e, py + e, pz + e)
-                    nx = np.float32(a - b - c + f)
-                    ny = np.float32(c - a - b + f)
-                    nz = np.float32(b - a - c + f)
-                    scale = _ONE / np.float32(np.sqrt(nx * nx + ny * ny + nz * nz + _TINY))
-                    normal[i, 0], normal[i, 1], normal[i, 2] = nx * scale, ny * scale, nz * scale
-                    arrived = True
-                    continue
-                elif step > _ZERO:
-                    fall = before - d
-                    forth += np.float32(0.9) * d * max(step - fall, _ZERO) / (step + fall)
-                before, step = d, max(forth, _CLOSE * width * t)
-                t += step
-            smooth = min(max(light, _ZERO), _ONE)
-            lit[i] = smooth * smooth * (np.float32(3) - np.float32(2) * smooth)
+                    rest = min(d * step / max(before - d, _TINY), flat * t)
+                    move = before - step if apart else rest if met else forth
+                    lane[a] = t + (move if on else _ZERO)
+                    lane[_STEP + a] = before if apart else forth
+                    lane[_BEFORE + a] = before if apart else d
+                    lane[_END + a] = end if on & (not met) else _ZERO
+                    kind[a] = which if met else kind[a]
+                    going += np.int32(on & (not met))
+                if going == 0:
+                    break
+            some = False
+            for a in range(many):
+                if kind[a] >= 0:
+                    distance[first + a] = lane[a]
+                    some = True
+            if beams:
+                continue
+            if some:
+                # Central differences on the corners of a tetrahedron.
+                for a in range(LANES):
+                    lane[_NORMAL + a] = _ZERO
+                    lane[_NORMAL_Y + a] = _ZERO
+                    lane[_NORMAL_Z + a] = _ZERO
+                for corner in range(4):
+                    ex = _ONE if corner == 0 or corner == 3 else -_ONE
+                    ey = _ONE if corner >= 2 else -_ONE
+                    ez = _ONE if corner & 1 else -_ONE
+                    for a in range(LANES):
+                        t = lane[a]
+                        dx, dy, dz = lane[_ALONG + a], lane[_ALONG_Y + a], lane[_ALONG_Z + a]
+                        x, y, z = lane[_FROM + a], lane[_FROM_Y + a], lane[_FROM_Z + a]
+                        e = width * t
+                        x, y, z = x + t * dx + e * ex, y + t * dy + e * ey, z + t * dz + e * ez
+                        found, _ = nearest(params, x, y, z)
+                        lane[_NORMAL + a] += ex * np.float32(found)
+                        lane[_NORMAL_Y + a] += ey * np.float32(found)
+                        lane[_NORMAL_Z + a] += ez * np.float32(found)
+                for a in range(many):
+                    i = first + a
+                    if kind[a] >= 0:
+                        x, y, z = lane[_NORMAL + a], lane[_NORMAL_Y + a], lane[_NORMAL_Z + a]
+                        scale = _ONE / np.float32(np.sqrt(x * x + y * y + z * z + _TINY))
+                        normal[i, 0], normal[i, 1], normal[i, 2] = x * scale, y * scale, z * scale
+                        index[i] = kind[a]
+            # From what they met towards the sun; the rows of `end` now keep the light.
+            going = np.int32(0)
+            for a in range(LANES):
+                i = first + min(a, many - _SINGLE)
+                facing = _ZERO
+                for k in range(_AXES):
+                    facing += normal[i, k] * setting[np.uint64(5) + k]
+                t = distance[i]
+                e = width * t
+                lane[_LIGHT + a] = _ONE if facing > _ZERO else _ZERO
+                open_way = facing > _ZERO and t < _FAR
+                lane[a] = np.float32(2) * e if open_way else _NOTHING
+                lane[_STEP + a], lane[_BEFORE + a] = _ZERO, _ZERO
+                going += np.int32(open_way)
+                for k in range(_AXES):
+                    way = t * rays[i, k] + e * normal[i, k] if open_way else _ZERO
+                    lane[_FROM + k * LANES + a] = setting[k] + way
+            for _ in range(_SHADOW_STEPS):
+                if going == 0:
+                    break
+                going = np.int32(0)
+                for a in range(LANES):
+                    t, light = lane[a], lane[_LIGHT + a]
+                    along = t if t < _NOTHING else _ZERO
+                    x, y, z = lane[_FROM + a], lane[_FROM_Y + a], lane[_FROM_Z + a]
+                    x, y, z = x + along * setting[5], y + along * setting[6], z + along * setting[7]
+                    found, _ = nearest(params, x, y, z)
+                    d, before, step = np.float32(found), lane[_BEFORE + a], lane[_STEP + a]
+                    apart = step > before + abs(d)
+                    on = (light > _ZERO) & ((t < _SHADOW_FAR) | (apart & (t < _NOTHING)))
+                    seen = min(light, sharpness * d / t)
+                    seen = _ZERO if seen < _DARK else seen
+                    lane[_LIGHT + a] = seen if on & (not apart) else light
+                    forth = max(_stride(d, before, step), _CLOSE * width * t)
+                    lane[a] = t + (before - step if apart else forth) if on else _NOTHING
+                    lane[_STEP + a] = before if apart else forth
+                    lane[_BEFORE + a] = before if apart else d
+                    going += np.int32(on)
+            for a in range(many):
+                light = lane[_LIGHT + a]
+                lit[first + a] = light * light * (np.float32(3) - np.float32(2) * light)
 
     return trace_rays
