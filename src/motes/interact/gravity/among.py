@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.errors import SceneError
+from motes.errors import SceneError, SimulationError
 
 if TYPE_CHECKING:
     from motes.group import Bodies
-
-LEAST_TOLERANCE = {"float32": 1e-6, "float64": 1e-10}
-"""Errors below which the multipole method does not reach, by the type of the positions."""
 
 
 def pulls(p: Any, body: Bodies) -> bool:
@@ -28,28 +25,27 @@ def field_among(p: Any, bodies: Sequence[Bodies], field: Callable[..., Any]) -> 
     Arrays (..., n), in the order of `bodies`.
 
     Raises:
-        SceneError: a source does not take part, or the tolerance is below what the precision gives.
+        SceneError: a source does not take part.
+        SimulationError: a position became infinite, or the precision cannot keep the tolerance.
     """
     if unknown := sorted(set(p.sources) - {body.name for body in bodies}):
         raise SceneError(f'interaction "gravity": source "{unknown[0]}" does not take part in it.')
     sources = [body for body in bodies if pulls(p, body)]
     x, m = _joined(sources)
-    least = LEAST_TOLERANCE[x.dtype.name]
-    if 0 < p.tolerance < least:
-        raise SceneError(
-            f'interaction "gravity": tolerance = {p.tolerance:g} must be 0 or at least {least:g} '
-            f"in this precision."
-        )
     law = {
         "G": p.G,
         "softening": p.softening,
         "softening_kernel": p.softening_kernel,
         "tolerance": p.tolerance or None,
     }
-    found = _parted(field(x.T, m, **law).T, sources)
-    if passive := [body for body in bodies if not pulls(p, body)]:
-        y, _ = _joined(passive)
-        found |= _parted(field(x.T, m, targets=y.T, **law).T, passive)
+    passive = [body for body in bodies if not pulls(p, body)]
+    try:
+        found = _parted(field(x.T, m, **law).T, sources)
+        if passive:
+            y, _ = _joined(passive)
+            found |= _parted(field(x.T, m, targets=y.T, **law).T, passive)
+    except ValueError as fault:
+        raise SimulationError(f'interaction "gravity": {fault}') from None
     return [found[body.name] for body in bodies]
 
 
