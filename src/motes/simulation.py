@@ -38,7 +38,9 @@ class Simulation:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.start = -scene.prewarm
+        self._lead_in = round(scene.prewarm / scene.step)
+        self.start = -self._lead_in * scene.step
+        """Scene time at which the first step begins: 0 less the steps nearest to the prewarm."""
         self._steppers = {s.name: self._stepper(s) for s in scene.systems}
         self._groups = self._grouped()
         self._looks = {s.name: Look(s) for s in scene.systems}
@@ -52,8 +54,6 @@ class Simulation:
             self._state.systems[system.name] = Particles(system.name, real, moves, widths)
         self.work = 0
         """Particle-steps taken so far."""
-        self._lead_in = round(scene.prewarm / scene.step)
-        self.start = -self._lead_in * scene.step
         self._run(self._lead_in, None)
 
     def _stepper(self, system: System) -> Stepper:
