@@ -16,6 +16,7 @@ import tomllib
 from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -91,16 +92,22 @@ def _entry(entry: Entry, common: set[str]) -> Iterator[str]:
 
 def _fields(fields: Iterable[Field]) -> str:
     head = ("Parameter", "Default", "Unit", "Range", "Varies", "Meaning")
-    return _table(head, ([f"`{f.name}`", *_facts(f), f.scope, _inline(f.help)] for f in fields))
+    return _table(head, (_facts(field) for field in fields))
 
 
-def _facts(field: Field) -> tuple[str, str, str]:
-    """Default, unit, and range without the unit."""
-    value = field.default
-    endless = isinstance(value, float) and value >= 1e6
-    default = "none" if value is None else f"`{value:g}`" if endless else f"`{json.dumps(value)}`"
+def _facts(field: Field) -> tuple[str, ...]:
+    """The row of a parameter; its range without the unit, which has a column."""
     bare = field.range.replace(f" {field.unit}", "") if field.unit else field.range
-    return default, field.unit, MENU_PAGES.get(field.name, bare)
+    allowed = MENU_PAGES.get(field.name, bare)
+    default = _default(field.default)
+    return f"`{field.name}`", default, field.unit, allowed, field.scope, _inline(field.help)
+
+
+def _default(value: Any) -> str:
+    if value is None:
+        return "none"
+    endless = isinstance(value, float) and value >= 1e6
+    return f"`{value:g}`" if endless else f"`{json.dumps(value)}`"
 
 
 def _methods() -> Iterator[str]:

@@ -24,7 +24,7 @@ LARGEST = 60_000
 INSTANT = 0.6
 """Share of the film at which a still is taken."""
 
-INSTANTS: dict[str, float] = {}
+INSTANTS = {"fireworks": 0.75, "fountain": 0.9}
 """Shares for scenes that are better seen at another time."""
 
 

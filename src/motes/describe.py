@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from motes.catalog import KINDS, Component, catalog, find, kinds
+from motes.catalog.parameter import Parameter
 from motes.errors import SceneError, likely
 from motes.integrate import method, scene_methods
-from motes.parameter import Parameter
 
 DOCUMENT = "document"
 """Kind of the tables that a scene itself has."""

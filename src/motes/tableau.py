@@ -296,12 +296,12 @@ Table = Method | Implicit | Rosenbrock | Nystrom | BackwardDifference
 def composed(order: int, weights: Sequence[float]) -> Splitting:
     """Symmetric composition of leapfrogs of lengths w_1 ... w_m, w_0, w_m ... w_1, w_0 the rest.
 
-    Drift first: each leapfrog is half a drift, a kick, half a drift, and neighbours join.
+    Each leapfrog is half a kick, a drift, half a kick; neighbouring kicks join.
     """
     lengths = [*weights, 1 - 2 * sum(weights), *reversed(weights)]
     halves = [length / 2 for length in lengths]
-    drifts = [halves[0], *(x + y for x, y in pairwise(halves)), halves[-1]]
-    return Splitting(order=order, kicks=(0, *lengths, 0), drifts=tuple(drifts))
+    kicks = (halves[0], *(x + y for x, y in pairwise(halves)), halves[-1])
+    return Splitting(order=order, kicks=kicks, drifts=tuple(lengths))
 
 
 def _times(row: Sequence[float], matrix: Sequence[Sequence[float]]) -> list[float]:

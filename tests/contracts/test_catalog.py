@@ -12,9 +12,9 @@ import pytest
 
 import motes
 from motes.catalog import KINDS, Component, catalog, component, find, quantity
+from motes.catalog.parameter import SCOPES
 from motes.errors import SceneError
 from motes.kernel import kernel
-from motes.parameter import SCOPES
 
 COMPONENTS = [
     pytest.param(c, id=f"{kind}/{name}")

@@ -20,7 +20,7 @@ from motes.catalog import Component, catalog
 from motes.compile.text import Text
 from motes.jit import jit
 from motes.kernel import kernel
-from motes.language import Translation
+from motes.kernel.language import Translation
 
 RESULTS = {"acceleration": 3, "velocity": 3, "relaxation": 4, "distance": 1, "dies": 1}
 STATE = ("x", "y", "z", "vx", "vy", "vz")

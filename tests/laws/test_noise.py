@@ -8,7 +8,7 @@ from numba import float32
 from numba.core.caching import NullCache
 
 from motes.jit import jit
-from motes.language import Translation
+from motes.kernel.language import Translation
 from motes.noise import curl, fractal_noise, noise, single_curl
 
 pytestmark = pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")

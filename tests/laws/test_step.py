@@ -104,7 +104,7 @@ def test_folding_a_default_changes_nothing_but_rounding(
 def test_folding_follows_what_a_literal_implies() -> None:
     """A vertical vortex at the origin without pull and lift is a handful of operations."""
     from motes.force import Vortex
-    from motes.language import Translation
+    from motes.kernel.language import Translation
 
     known = {
         key: tuple(float(v) for v in control.values)

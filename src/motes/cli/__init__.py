@@ -16,7 +16,7 @@ import click
 
 from motes.errors import MotesError
 
-COMMANDS = ("demo", "run", "render", "new", "check", "show", "info", "schema", "doctor")
+COMMANDS = ("demo", "run", "render", "new", "check", "show", "info", "schema", "doctor", "ode")
 """Names of the commands, in the order of the help; `run` is the function `command` in run.py."""
 
 INTERRUPTED = 130

@@ -25,7 +25,7 @@ from motes.control.curve import TABLE_SIZE
 from motes.files import written_whole
 from motes.jit import FAST, STRICT, cache_folder, jit
 from motes.kernel import ELEMENTARY
-from motes.language import Translation, can_fold
+from motes.kernel.language import Translation, can_fold
 
 AXES = ("x", "y", "z")
 STATE = ("x", "y", "z", "vx", "vy", "vz")

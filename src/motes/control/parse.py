@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from motes.catalog.parameter import SCOPES, Parameter
 from motes.control.color import parse_color
 from motes.control.constant import Constant, Setting
 from motes.control.control import Control, Values
@@ -17,7 +18,6 @@ from motes.control.curve import SCOPE_OF, Curve
 from motes.control.draw import Choice, Normal, Uniform
 from motes.control.spline import Spline
 from motes.errors import ValueFault, likely, within
-from motes.parameter import SCOPES, Parameter
 
 INTERPOLATIONS = ("linear", "smooth", "monotone", "constant", "bezier")
 LARGEST = 1e30

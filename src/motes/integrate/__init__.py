@@ -26,6 +26,7 @@ def scene_methods() -> dict[str, Method]:
     return {name: found for name, found in methods().items() if isinstance(found, Method)}
 
 
+@cache
 def table(name: str) -> Table:
     """A method by name. Raises SceneError with the menu."""
     if name not in names():

@@ -48,17 +48,13 @@ class View:
     def add_light(self, lamps: Array, colors: Array, haze: float, out: Array) -> None:
         """Add the light of lamps (k, 7) on solids of `colors`, through the haze, to out (n, 4)."""
         tasks = blocks(len(self.x), RAYS)
-        origin = np.asarray(self.camera.position, np.float32)
 
         def task(number: int) -> None:
             rows = slice(*tasks[number])
             hits = self.hits.part(rows)
-            solid = np.flatnonzero(hits.index >= 0)
-            distance = hits.distance[solid, None]
-            rays = self.camera.rays(self.x[rows][solid], self.y[rows][solid], self.size)
-            seen = colors[hits.index[solid]] * np.exp(distance / np.float32(-haze))
-            light = illuminate(origin + distance * rays, hits.normal[solid], lamps)
-            out[rows.start + solid, :3] += seen * light
+            rays = self.camera.rays(self.x[rows], self.y[rows], self.size)
+            surface = (hits.distance, hits.normal, hits.index)
+            illuminate(self.camera.position, rays, *surface, colors, haze, lamps, out[rows])
 
         share(task, len(tasks))
 
@@ -134,7 +130,8 @@ def _clear_way(camera: Camera, size: tuple[int, int], solids: Solids) -> Array:
     width, height = size
     across, down = -(-width // BLOCK), -(-height // BLOCK)
     x, y = _centers(across, down, BLOCK)
-    hits = Hits.none(len(x))
+    hits = Hits.empty(len(x))
+    hits.clear()
     near = np.full(len(x), camera.near, np.float32)
     tasks = blocks(len(x), RAYS // BLOCK)
     reach = BLOCK * 0.7072 / camera.focal(height)
@@ -160,9 +157,9 @@ def _look(
 ) -> View:
     """What is seen at points x, y of a picture; bent solids are looked for beyond `clear` only."""
     n = len(x)
-    hits = Hits.none(n)
-    depth = np.full(n, np.inf, np.float32)
-    color = np.ones((n, 4), np.float32)
+    hits = Hits.empty(n)
+    depth = np.empty(n, np.float32)
+    color = np.empty((n, 4), np.float32)
     lamp = sky or Sky()
     numbers = lamp.numbers()
     softness = (lamp.sun or Sun()).softness
@@ -177,13 +174,14 @@ def _look(
     def task(number: int) -> None:
         rows = slice(*tasks[number])
         some = hits.part(rows)
+        some.clear()
         rays = camera.rays(x[rows], y[rows], size)
         if solids is not None:
             solids.meet_planes(camera.position, rays, camera.near, some)
             trace(solids, camera.position, rays, clear[rows], width, sun, softness, some)
             if some.index.max(initial=-1) >= len(colors):
                 raise ValueError(f"solid {some.index.max()} has no colour; there are {len(colors)}")
-            depth[rows] = some.distance * (rays @ forward)
+        depth[rows] = some.distance * (rays @ forward)
         surface = (some.distance, some.normal, some.index, some.lit)
         shade(rays, *surface, colors, numbers, color[rows])
         if sky is None:
@@ -200,19 +198,20 @@ def _edges(hits: Hits, size: tuple[int, int], bent: int) -> NDArray[np.bool_]:
     """
     width, height = size
     index = hits.index.reshape(height, width)
-    near = 1.0 / hits.distance.reshape(height, width)
     edges = np.zeros((height, width), np.bool_)
     for first, second, apart in (
         (np.s_[:, :-1], np.s_[:, 1:], 1),
         (np.s_[:-1], np.s_[1:], width),
     ):
         differs = index[first] != index[second]
-        row, column = np.nonzero(~differs & (index[first] >= 0) & (index[first] < bent))
+        row, column = np.nonzero((index[first] >= 0) & (index[first] < bent) & ~differs)
         one = row * width + column
-        folded = np.einsum("ik,ik->i", hits.normal[one], hits.normal[one + apart]) < 0.8
+        other = one + apart
         # On a flat face 1/distance changes evenly, so only a jump counts.
-        jump = np.abs(near[first] - near[second]) > 0.1 * np.maximum(near[first], near[second])
-        differs[row, column] = folded | jump[row, column]
+        near, next_near = 1.0 / hits.distance[one], 1.0 / hits.distance[other]
+        differs[row, column] = np.abs(near - next_near) > 0.1 * np.maximum(near, next_near)
+        folded = np.einsum("ik,ik->i", hits.normal[one], hits.normal[other]) < 0.8
+        differs[row, column] |= folded
         edges[first] |= differs
         edges[second] |= differs
     return edges

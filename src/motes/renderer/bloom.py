@@ -64,7 +64,7 @@ def _taps(count: int, size: int, factor: int) -> tuple[NDArray[np.int32], Array]
     else:
         index = (target + np.array([-1, 1])) // 2
         weight = np.where(target % 2 == [0, 1], 0.25, 0.75)
-    return np.clip(index, 0, size - 1).astype(np.int32), weight.astype(np.float32)
+    return np.clip(index, 0, size - 1).astype(np.int32), np.array(weight, np.float32, order="C")
 
 
 @jit

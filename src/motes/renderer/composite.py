@@ -57,6 +57,7 @@ def composite(
     last_tile: Any,
     across: Any,
     starts: Any,
+    order: Any,
     records: Any,
     depth: Any,
     edge: Any,
@@ -68,11 +69,11 @@ def composite(
 ) -> None:
     """Composite the tiles [first_tile, last_tile) of image (h, w, 4).
 
-    records holds the rows starts[tile] to starts[tile + 1] of each tile, from near to far. depth
-    (h, w) is the distance of solids along the axis, or (0, 0) without any; edge (h, w) is the row
-    of `samples` (e, 4) of a pixel on a silhouette, or -1. A fresh image starts clear, one that is
-    not holds C and T of nearer records; a final one is put over the backdrop and gets the alpha
-    channel in place of T.
+    records holds the rows starts[tile] to starts[tile + 1] of each tile, and order the same rows
+    from near to far; it is empty where nothing hides anything. depth (h, w) is the distance of
+    solids along the axis, or (0, 0) without any; edge (h, w) is the row of `samples` (e, 4) of a
+    pixel on a silhouette, or -1. A fresh image starts clear, one that is not holds C and T of
+    nearer records; a final one is put over the backdrop and gets the alpha channel in place of T.
     """
     buffer = np.empty(_CLEAR + _PLANE, np.float32)
     weight = np.empty(_STRIDE, np.float32)
@@ -97,7 +98,8 @@ def composite(
                     for k in range(4 if row >= 0 else 1):
                         d = samples[row, k] if row >= 0 else depth[b, a]
                         closest, deepest = min(closest, d), max(deepest, d)
-        for i in range(starts[tile], starts[tile + 1]):
+        for rank in range(starts[tile], starts[tile + 1]):
+            i = np.int64(order[rank]) if order.shape[0] > 0 else rank
             radius, inverse = records[i, 2], records[i, 3]
             x = records[i, 0] - np.float32(left) - _HALF
             y = records[i, 1] - np.float32(top) - _HALF
@@ -178,7 +180,7 @@ def composite(
                     buffer[at + _GREEN + a] += w * green
                     buffer[at + _BLUE + a] += w * blue
                     buffer[at + _CLEAR + a] -= w * hidden
-            if i & 127 == 127:
+            if rank & 127 == 127:
                 clearest = _ZERO
                 for b in range(np.uint64(rows)):
                     for a in range(np.uint64(columns)):

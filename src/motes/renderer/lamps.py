@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.jit import blocks, jit, share
+from motes.renderer.camera import Vector
 from motes.renderer.layer import Layer
 
 Array = NDArray[np.float32]
@@ -66,39 +67,78 @@ def _of(layer: Layer) -> list[NDArray[np.float64]]:
 def scattered(position: Array, lamps: Array) -> Array:
     """What lamps give to matter at positions (n, 3), per colour (n, 3)."""
     light = np.empty_like(position)
+    columns = np.ascontiguousarray(lamps.T)
     tasks = blocks(len(position), ROWS)
 
     def task(number: int) -> None:
         rows = slice(*tasks[number])
-        light[rows] = illuminate(position[rows], np.empty((0, 3), np.float32), lamps)
+        _scatter(position[rows], columns, light[rows])
 
     share(task, len(tasks))
     return light
 
 
-def illuminate(position: Array, normal: Array, lamps: Array) -> Array:
-    """The light of lamps on surfaces at (n, 3), or without normals on matter there, (n, 3)."""
-    light = np.empty((len(position), 3), np.float32)
-    _illuminate(position, normal, np.ascontiguousarray(lamps.T), light)
-    return light
-
-
 @jit
-def _illuminate(position: Any, normal: Any, lamps: Any, out: Any) -> None:
-    surface = normal.shape[0] > 0
+def _scatter(position: Any, lamps: Any, out: Any) -> None:
     for i in range(position.shape[0]):
-        x, y, z = position[i, 0], position[i, 1], position[i, 2]
-        nx, ny, nz = _ZERO, _ZERO, _ZERO
-        if surface:
-            nx, ny, nz = normal[i, 0], normal[i, 1], normal[i, 2]
         red, green, blue = _ZERO, _ZERO, _ZERO
         for k in range(lamps.shape[1]):
-            dx, dy, dz = lamps[0, k] - x, lamps[1, k] - y, lamps[2, k] - z
-            per = _ONE / (dx * dx + dy * dy + dz * dz + lamps[3, k] + _TINY)
-            part = _HALF * per
-            if surface:
-                part = max(nx * dx + ny * dy + nz * dz, _ZERO) * per * np.float32(np.sqrt(per))
+            dx, dy = lamps[0, k] - position[i, 0], lamps[1, k] - position[i, 1]
+            dz = lamps[2, k] - position[i, 2]
+            part = _HALF / (dx * dx + dy * dy + dz * dz + lamps[3, k] + _TINY)
             red += part * lamps[4, k]
             green += part * lamps[5, k]
             blue += part * lamps[6, k]
         out[i, 0], out[i, 1], out[i, 2] = red, green, blue
+
+
+def illuminate(
+    origin: Vector,
+    rays: Array,
+    distance: Array,
+    normal: Array,
+    index: NDArray[np.int32],
+    colors: Array,
+    haze: float,
+    lamps: Array,
+    out: Array,
+) -> None:
+    """Add what solids show of the light of lamps to out (n, 4), where rays (n, 3) met them.
+
+    distance, normal and index are those of `Hits`; colors (k, 3) the colours of the solids.
+    """
+    setting = np.array([*origin, 1.0 / haze], np.float32)
+    columns = np.ascontiguousarray(lamps.T)
+    _illuminate(setting, rays, distance, normal, index, colors, columns, out)
+
+
+@jit
+def _illuminate(
+    setting: Any,
+    rays: Any,
+    distance: Any,
+    normal: Any,
+    index: Any,
+    colors: Any,
+    lamps: Any,
+    out: Any,
+) -> None:
+    for i in range(rays.shape[0]):
+        which, t = index[i], distance[i]
+        if which < 0:
+            continue
+        x, y = setting[0] + t * rays[i, 0], setting[1] + t * rays[i, 1]
+        z = setting[2] + t * rays[i, 2]
+        nx, ny, nz = normal[i, 0], normal[i, 1], normal[i, 2]
+        red, green, blue = _ZERO, _ZERO, _ZERO
+        for k in range(lamps.shape[1]):
+            dx, dy, dz = lamps[0, k] - x, lamps[1, k] - y, lamps[2, k] - z
+            per = _ONE / (dx * dx + dy * dy + dz * dz + lamps[3, k] + _TINY)
+            part = max(nx * dx + ny * dy + nz * dz, _ZERO) * per * np.float32(np.sqrt(per))
+            red += part * lamps[4, k]
+            green += part * lamps[5, k]
+            blue += part * lamps[6, k]
+        seen = np.exp(-t * setting[3])
+        out[i, 0] += seen * colors[which, 0] * red
+        out[i, 1] += seen * colors[which, 1] * green
+        out[i, 2] += seen * colors[which, 2] * blue

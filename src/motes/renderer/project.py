@@ -55,6 +55,8 @@ def project(
     opacity = lens[6]
     for i in range(size.size):
         records[i, 2] = -_ONE
+        for k in range(8, min(records.shape[1], 10)):
+            records[i, k] = _ZERO
         px, py, pz = position[i, 0], position[i, 1], position[i, 2]
         alpha = color[i, 3]
         x0 = views[0, 0, 0] * px + views[0, 0, 1] * py + views[0, 0, 2] * pz + views[0, 0, 3]

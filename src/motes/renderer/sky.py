@@ -160,3 +160,4 @@ def shade(
                 near = colors[index[i], k] * (ambient + sky[3, k] * facing)
                 far += seen * (near - far)
             out[i, k] = far
+        out[i, 3] = _ONE

@@ -41,15 +41,17 @@ LANES = np.uint64(16)
 
 # Rows of lanes: the way so far is the first; then its end, or the light that is left; the last
 # step, and the distance where it began; where the ray starts, its direction, the normal of what it
-# met. Unsigned, because an index that may be negative keeps a loop from becoming SIMD.
+# met; the point at which the distance is asked, and the distance. Unsigned, because an index that
+# may be negative keeps a loop from becoming SIMD.
 _END, _STEP, _BEFORE = (np.uint64(row) * LANES for row in (1, 2, 3))
 _LIGHT = _END
 _FROM, _FROM_Y, _FROM_Z = (np.uint64(row) * LANES for row in (4, 5, 6))
 _ALONG, _ALONG_Y, _ALONG_Z = (np.uint64(row) * LANES for row in (7, 8, 9))
 _NORMAL, _NORMAL_Y, _NORMAL_Z = (np.uint64(row) * LANES for row in (10, 11, 12))
 _AXES = np.uint64(3)
+_AT, _AT_Y, _AT_Z, _FOUND = (np.uint64(row) * LANES for row in (13, 14, 15, 16))
 _SINGLE = np.uint64(1)
-_ALL = np.uint64(13) * LANES
+_ALL = np.uint64(17) * LANES
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,14 +132,18 @@ class Hits:
     """(n,) part of the sun that is seen from there."""
 
     @classmethod
-    def none(cls, n: int) -> Hits:
-        """Rays that met nothing."""
-        return cls(
-            np.full(n, np.inf, np.float32),
-            np.zeros((n, 3), np.float32),
-            np.full(n, -1, np.int32),
-            np.ones(n, np.float32),
-        )
+    def empty(cls, n: int) -> Hits:
+        """Room for n rays; nothing is written yet."""
+        single = np.float32
+        room = np.empty(n, single), np.empty((n, 3), single), np.empty(n, np.int32)
+        return cls(*room, np.empty(n, single))
+
+    def clear(self) -> None:
+        """Make them rays that met nothing."""
+        self.distance.fill(np.inf)
+        self.normal.fill(0)
+        self.index.fill(-1)
+        self.lit.fill(1)
 
     def part(self, rows: slice) -> Hits:
         """Views of some rows."""
@@ -189,6 +195,15 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
     """
 
     @jit
+    def measure(params: Any, lane: Any, which: Any) -> None:
+        """Distance of the nearest solid from the point of each lane, and its index."""
+        for a in range(LANES):
+            x, y, z = lane[_AT + a], lane[_AT_Y + a], lane[_AT_Z + a]
+            found, index = nearest(params, x, y, z)
+            lane[_FOUND + a] = np.float32(found)
+            which[a] = index
+
+    @jit
     def trace_rays(
         params: Any,
         setting: Any,
@@ -207,27 +222,31 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
         close = width if beams else _CLOSE * width
         flat = np.float32(0 if beams else 16) * width
         lane = np.empty(_ALL, np.float32)  # One array: its parts do not overlap.
-        kind = np.empty(LANES, np.int32)
+        kind, which = np.empty(LANES, np.int32), np.empty(LANES, np.int32)
         count: Any = np.uint64(rays.shape[0])
         for group in range((count + LANES - _SINGLE) // LANES):
             first = group * LANES
             many = min(count - first, LANES)
-            for a in range(LANES):
-                i = first + min(a, many - _SINGLE)
-                kind[a] = -1
+            kind[:] = -1
+            lane[_END : _END + LANES] = _ZERO
+            for a in range(many):
+                i = first + a
                 lane[a], lane[_END + a] = near[i], min(distance[i], _FAR)
                 lane[_STEP + a], lane[_BEFORE + a] = _ZERO, _ZERO
                 for k in range(_AXES):
                     lane[_FROM + k * LANES + a] = setting[k]
                     lane[_ALONG + k * LANES + a] = rays[i, k]
             for _ in range(_STEPS):
+                for a in range(LANES):
+                    t = lane[a]
+                    lane[_AT + a] = lane[_FROM + a] + t * lane[_ALONG + a]
+                    lane[_AT_Y + a] = lane[_FROM_Y + a] + t * lane[_ALONG_Y + a]
+                    lane[_AT_Z + a] = lane[_FROM_Z + a] + t * lane[_ALONG_Z + a]
+                measure(params, lane, which)
                 going = np.int32(0)
                 for a in range(LANES):
                     t, end = lane[a], lane[_END + a]
-                    dx, dy, dz = lane[_ALONG + a], lane[_ALONG_Y + a], lane[_ALONG_Z + a]
-                    x, y, z = lane[_FROM + a], lane[_FROM_Y + a], lane[_FROM_Z + a]
-                    found, which = nearest(params, x + t * dx, y + t * dy, z + t * dz)
-                    d, before, step = np.float32(found), lane[_BEFORE + a], lane[_STEP + a]
+                    d, before, step = lane[_FOUND + a], lane[_BEFORE + a], lane[_STEP + a]
                     # Where the spheres do not touch, take the cautious step after all.
                     apart = step > before + abs(d)
                     least = close * t
@@ -242,7 +261,7 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                     lane[_STEP + a] = before if apart else forth
                     lane[_BEFORE + a] = before if apart else d
                     lane[_END + a] = end if on & (not met) else _ZERO
-                    kind[a] = which if met else kind[a]
+                    kind[a] = which[a] if met else kind[a]
                     going += np.int32(on & (not met))
                 if going == 0:
                     break
@@ -265,14 +284,15 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                     ez = _ONE if corner & 1 else -_ONE
                     for a in range(LANES):
                         t = lane[a]
-                        dx, dy, dz = lane[_ALONG + a], lane[_ALONG_Y + a], lane[_ALONG_Z + a]
-                        x, y, z = lane[_FROM + a], lane[_FROM_Y + a], lane[_FROM_Z + a]
                         e = width * t
-                        x, y, z = x + t * dx + e * ex, y + t * dy + e * ey, z + t * dz + e * ez
-                        found, _ = nearest(params, x, y, z)
-                        lane[_NORMAL + a] += ex * np.float32(found)
-                        lane[_NORMAL_Y + a] += ey * np.float32(found)
-                        lane[_NORMAL_Z + a] += ez * np.float32(found)
+                        lane[_AT + a] = lane[_FROM + a] + t * lane[_ALONG + a] + e * ex
+                        lane[_AT_Y + a] = lane[_FROM_Y + a] + t * lane[_ALONG_Y + a] + e * ey
+                        lane[_AT_Z + a] = lane[_FROM_Z + a] + t * lane[_ALONG_Z + a] + e * ez
+                    measure(params, lane, which)
+                    for a in range(LANES):
+                        lane[_NORMAL + a] += ex * lane[_FOUND + a]
+                        lane[_NORMAL_Y + a] += ey * lane[_FOUND + a]
+                        lane[_NORMAL_Z + a] += ez * lane[_FOUND + a]
                 for a in range(many):
                     i = first + a
                     if kind[a] >= 0:
@@ -282,8 +302,9 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
                         index[i] = kind[a]
             # From what they met towards the sun; the rows of `end` now keep the light.
             going = np.int32(0)
-            for a in range(LANES):
-                i = first + min(a, many - _SINGLE)
+            lane[:LANES] = _NOTHING
+            for a in range(many):
+                i = first + a
                 facing = _ZERO
                 for k in range(_AXES):
                     facing += normal[i, k] * setting[np.uint64(5) + k]
@@ -300,14 +321,16 @@ def _tracer(nearest: Callable[..., Any]) -> Any:
             for _ in range(_SHADOW_STEPS):
                 if going == 0:
                     break
+                for a in range(LANES):
+                    along = lane[a] if lane[a] < _NOTHING else _ZERO
+                    lane[_AT + a] = lane[_FROM + a] + along * setting[5]
+                    lane[_AT_Y + a] = lane[_FROM_Y + a] + along * setting[6]
+                    lane[_AT_Z + a] = lane[_FROM_Z + a] + along * setting[7]
+                measure(params, lane, which)
                 going = np.int32(0)
                 for a in range(LANES):
                     t, light = lane[a], lane[_LIGHT + a]
-                    along = t if t < _NOTHING else _ZERO
-                    x, y, z = lane[_FROM + a], lane[_FROM_Y + a], lane[_FROM_Z + a]
-                    x, y, z = x + along * setting[5], y + along * setting[6], z + along * setting[7]
-                    found, _ = nearest(params, x, y, z)
-                    d, before, step = np.float32(found), lane[_BEFORE + a], lane[_STEP + a]
+                    d, before, step = lane[_FOUND + a], lane[_BEFORE + a], lane[_STEP + a]
                     apart = step > before + abs(d)
                     on = (light > _ZERO) & ((t < _SHADOW_FAR) | (apart & (t < _NOTHING)))
                     seen = min(light, sharpness * d / t)

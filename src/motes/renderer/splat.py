@@ -1,4 +1,4 @@
-"""Particles to an image: project all layers, distribute them to tiles, composite each tile.
+"""Particles to an image: project all layers, distribute them to tiles, sort and composite each.
 
 A tile belongs to one thread and its list to the order of the particles, so the picture has the
 same bits for any number of threads.
@@ -17,6 +17,7 @@ from motes.renderer.camera import Camera, Vector
 from motes.renderer.composite import composite
 from motes.renderer.lamps import scattered
 from motes.renderer.layer import Layer
+from motes.renderer.order import sort_tiles
 from motes.renderer.project import TILE, distribute, project
 
 Array = NDArray[np.float32]
@@ -71,11 +72,12 @@ def splat(
     height, width = backdrop.shape[:2]
     across, down = -(-width // TILE), -(-height // TILE)
     records = _project(layers, camera, (width, height), shutter, light, lamps)
-    records = _from_near_to_far(records)
+    covers = any(layer.opacity > 0 for layer in layers)
     image = np.empty((height, width, 4), np.float32)
     slabs = _slabs(records, across, down)
     for number, slab in enumerate(slabs):
         starts, packed = _pack(slab, across, down)
+        order = np.empty(len(packed) if covers else 0, np.uint32)
         cuts = _cuts(starts, across)
 
         def task(
@@ -83,12 +85,16 @@ def splat(
             cuts: NDArray[np.int64] = cuts,
             starts: NDArray[np.int64] = starts,
             packed: Array = packed,
+            order: NDArray[np.uint32] = order,
             fresh: bool = number == 0,
             final: bool = number == len(slabs) - 1,
         ) -> None:
             low, high = cuts[band], cuts[band + 1]
+            if covers:
+                sort_tiles(low, high, starts, packed, order)
+            tiles = (low, high, across, starts, order, packed)
             solids = (depths.depth, depths.edge, depths.samples)
-            composite(low, high, across, starts, packed, *solids, backdrop, fresh, final, image)
+            composite(*tiles, *solids, backdrop, fresh, final, image)
 
         share(task, len(cuts) - 1)
     return image
@@ -175,9 +181,9 @@ def _pack(records: Array, across: int, down: int) -> tuple[NDArray[np.int64], Ar
     places = np.ascontiguousarray(ends.T) - counts
     starts = np.append(0, ends[:, -1]) if len(tasks) else np.zeros(across * down + 1, np.int64)
     packed = np.empty((int(starts[-1]), records.shape[1]), np.float32)
-    packed.fill(0)  # In order, the system hands out its pages at a tenth of the cost.
-    if len(packed) == 0:
-        return starts, packed
+    pages = blocks(len(packed), ROWS)
+    # In order, the system hands out its pages at a tenth of the cost.
+    share(lambda number: packed[slice(*pages[number])].fill(0), len(pages))
 
     def fill(number: int) -> None:
         distribute(records[slice(*tasks[number])], places[number], across, down, packed)
@@ -186,36 +192,8 @@ def _pack(records: Array, across: int, down: int) -> tuple[NDArray[np.int64], Ar
     return starts, packed
 
 
-def _from_near_to_far(records: Array) -> Array:
-    """The visible records by falling 1/z at mid-shutter; equal ones in the order given.
-
-    Frames of pure light need no order and keep theirs.
-    """
-    visible = np.flatnonzero(records[:, 2] > 0)
-    if not np.any(records[visible, 7]):
-        return records if len(visible) == len(records) else records[visible]
-    inverse = records[visible, 3]
-    if records.shape[1] > 8:
-        inverse += records[visible, 10] / 2
-    # The pattern of a positive float grows evenly within each octave; of the bits that vary the
-    # upper 16 are the key, which NumPy sorts by radix.
-    pattern = inverse.view(np.uint32)
-    key = pattern.max() - pattern
-    key >>= np.uint32(max(int(key.max()).bit_length() - 16, 0))
-    order = visible[np.argsort(key.astype(np.uint16), kind="stable")]
-    sorted_records = np.empty((len(order), records.shape[1]), np.float32)
-    tasks = blocks(len(order), ROWS)
-
-    def task(number: int) -> None:
-        part = slice(*tasks[number])
-        np.take(records, order[part], axis=0, out=sorted_records[part], mode="clip")
-
-    share(task, len(tasks))
-    return sorted_records
-
-
 def _slabs(records: Array, across: int, down: int) -> list[Array]:
-    """The records in one piece, or cut where their copies in tiles would exceed memory."""
+    """The records in one piece, or slabs of depth where their copies would exceed memory."""
     most = PACKED_BYTES // (4 * records.shape[1])
     extent = 2 * records[:, 2:3]
     if records.shape[1] > 8:
@@ -223,9 +201,14 @@ def _slabs(records: Array, across: int, down: int) -> list[Array]:
     widest = np.minimum(extent.max(initial=0.0) / TILE + 2, (across, down)).astype(np.float64)
     if len(records) * widest.prod() <= most:
         return [records]
-    tiles = np.minimum(extent / TILE + 2, (across, down)).astype(np.float64)
-    slab = np.cumsum(np.maximum(tiles[:, 0] * tiles[:, 1], 0)) // max(most - across * down, 1)
-    return np.split(records, np.flatnonzero(np.diff(slab)) + 1)
+    visible = np.flatnonzero(records[:, 2] > 0)
+    depth = -records[visible, 3]
+    if records.shape[1] > 8:
+        depth -= records[visible, 10] / 2
+    order = visible[np.argsort(depth, kind="stable")]
+    tiles = np.minimum(extent[order] / TILE + 2, (across, down)).astype(np.float64)
+    slab = np.cumsum(np.maximum(tiles[:, 0] * tiles[:, -1], 0)) // max(most - across * down, 1)
+    return np.split(records[order], np.flatnonzero(np.diff(slab)) + 1)
 
 
 def _cuts(starts: NDArray[np.int64], across: int) -> NDArray[np.int64]:

@@ -10,9 +10,9 @@ from pydantic import Field, field_validator
 
 from motes import integrate
 from motes.catalog import Component, find
+from motes.catalog.parameter import quantity
 from motes.control.control import Control
 from motes.errors import Problem
-from motes.parameter import quantity
 from motes.scene import names
 from motes.scene.entry import Entry
 from motes.scene.section import Section

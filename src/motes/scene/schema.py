@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from motes.catalog import KINDS, Component, catalog, kinds
+from motes.catalog.parameter import SCOPES, Parameter
 from motes.control.curve import SCOPE_OF
 from motes.control.parse import EXTRAPOLATIONS, INTERPOLATIONS
 from motes.control.tables import MOST
-from motes.parameter import SCOPES, Parameter
 from motes.scene.document import Scene, System
 from motes.scene.names import WORD
 from motes.scene.section import Section

@@ -13,11 +13,11 @@ from typing import Any, ClassVar, Self, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from motes.catalog.parameter import Parameter
+from motes.catalog.source import attribute_docs
 from motes.control.constant import Setting
 from motes.control.control import Control
 from motes.errors import Problem, SceneError, likely, path_of
-from motes.parameter import Parameter
-from motes.source import attribute_docs
 
 
 def fault(message: str) -> PydanticCustomError:

@@ -6,8 +6,8 @@ from typing import ClassVar, Literal
 
 from pydantic import field_validator
 
+from motes.catalog.parameter import quantity
 from motes.control.control import Control
-from motes.parameter import quantity
 from motes.scene.section import Section, fault
 
 

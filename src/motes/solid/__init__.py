@@ -2,8 +2,9 @@
 
 A solid defines `distance(p, x, y, z)`: the signed distance [m] from its surface in its own frame,
 negative inside. It must not grow faster than the distance itself (a Lipschitz constant of 1), or
-impacts could be missed. `flat = True` says that it is linear, which is tested sooner. Pose, normal, the instant of impact, restitution, friction and drawing are
-written once, in the engine.
+impacts could be missed; a solid whose distance is linear says `flat = True`, which is quicker.
+Pose, normal, the instant of impact, restitution, friction and drawing are written once, in the
+engine.
 """
 
 from __future__ import annotations

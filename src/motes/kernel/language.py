@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from motes.catalog.source import function_node
 from motes.errors import SceneError
-from motes.fold import Known, foldable, folded, returned
 from motes.kernel import ELEMENTARY, Elementary
-from motes.source import function_node
+from motes.kernel.fold import Known, foldable, folded, returned
 
 BUILTINS = frozenset({"min", "max", "abs", "range", "bool", "len"})
 """Python's own functions that the kernel language has."""

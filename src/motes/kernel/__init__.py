@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from motes import elementary_double, elementary_single
+from motes.kernel import elementary_double, elementary_single
 
 __all__ = [
     "ELEMENTARY",

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar, dataclass_transform
 
+from motes.catalog.parameter import Color, Flag, Integer, Number, Parameter, Vector, quantity
+from motes.catalog.source import attribute_docs, class_source
 from motes.errors import Problem, SceneError, likely, path_of
-from motes.parameter import Color, Flag, Integer, Number, Parameter, Vector, quantity
-from motes.source import attribute_docs, class_source
 
 if TYPE_CHECKING:
     from motes.control.control import Control

@@ -1,0 +1,264 @@
+"""Gravity of n bodies without a scene: accelerations and potentials of points that pull.
+
+    from motes import gravity
+    a = gravity.acceleration(x, m, softening=0.05)           # all pairs
+    a = gravity.acceleration(x, m, tolerance=1e-3)           # fast multipole method, O(n)
+
+Particle i is pulled by all j with a_i = G sum_j m_j (x_j - x_i) / r^3 and has the potential
+phi_i = -G sum_j m_j / r, r = |x_j - x_i|, weakened at short range by a softening. Points at one
+place do not pull each other, and no particle counts itself.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from motes.errors import likely
+from motes.interact.gravity.direct import direct
+from motes.interact.gravity.multipole import multipole
+from motes.interact.gravity.softening import SUPPORT, center_depth
+
+__all__ = ["acceleration", "field", "potential"]
+
+METHODS = ("auto", "direct", "multipole")
+SOFTENINGS = ("spline", "plummer")
+
+TIGHTEST = {"single": 1e-6, "double": 1e-10}
+"""Smallest tolerance by the precision of the positions."""
+
+
+def acceleration(
+    x: ArrayLike,
+    m: ArrayLike,
+    *,
+    G: float = 1.0,
+    softening: float = 0.0,
+    softening_kernel: str = "spline",
+    tolerance: float | None = None,
+    method: str = "auto",
+    targets: ArrayLike | None = None,
+) -> NDArray[Any]:
+    """Accelerations a_i = G sum_j m_j s(r) (x_j - x_i), s = 1 / r^3 where there is no softening.
+
+    Parameters
+    ----------
+    x: positions (n, 3), float32 or float64, which is the precision of direct sums and of results.
+    m: masses (n,), at least 0.
+    G: gravitational constant, in the units of the rest.
+    softening: length h. With "spline", gravity is that of a cubic spline of support 2.8 h, exactly
+        Newton's beyond (Springel, Yoshida and White 2001, equation A1); with "plummer",
+        s = (r^2 + h^2)^(-3/2).
+    softening_kernel: "spline" or "plummer".
+    tolerance: largest rms error in units of the rms acceleration, below 1 and at least 1e-10
+        (1e-6 for float32); None for direct sums.
+    method: "direct", "multipole", or "auto": the faster one that keeps the tolerance.
+    targets: other points (k, 3) at which to find the acceleration.
+
+    Returns (n, 3) or (k, 3). Raises ValueError for wrong shapes or values.
+
+    Source of the multipole method: Dehnen, Computational Astrophysics and Cosmology 1 (2014) 1.
+    """
+    problem = _Problem(x, m, G, softening, softening_kernel, tolerance, method, targets)
+    return problem.acceleration(problem.sums(False))
+
+
+def potential(
+    x: ArrayLike,
+    m: ArrayLike,
+    *,
+    G: float = 1.0,
+    softening: float = 0.0,
+    softening_kernel: str = "spline",
+    tolerance: float | None = None,
+    method: str = "auto",
+    targets: ArrayLike | None = None,
+) -> NDArray[Any]:
+    """Potentials phi_i = -G sum_j m_j w(r), j not i, w = 1 / r where there is no softening.
+
+    Parameters and errors are those of `acceleration`; the tolerance holds for both. Returns (n,) or
+    (k,). The energy of all is half the sum of m phi. Coincident particles count only if softened.
+    """
+    problem = _Problem(x, m, G, softening, softening_kernel, tolerance, method, targets)
+    return problem.potential(problem.sums(True))
+
+
+def field(
+    x: ArrayLike,
+    m: ArrayLike,
+    *,
+    G: float = 1.0,
+    softening: float = 0.0,
+    softening_kernel: str = "spline",
+    tolerance: float | None = None,
+    method: str = "auto",
+    targets: ArrayLike | None = None,
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Accelerations and potentials together, as `acceleration` and `potential` give them."""
+    problem = _Problem(x, m, G, softening, softening_kernel, tolerance, method, targets)
+    sums = problem.sums(True)
+    return problem.acceleration(sums), problem.potential(sums)
+
+
+class _Problem:
+    """Checked input, in units in which single precision neither over- nor underflows."""
+
+    def __init__(
+        self,
+        x: ArrayLike,
+        m: ArrayLike,
+        G: float,
+        softening: float,
+        kernel: str,
+        tolerance: float | None,
+        method: str,
+        targets: ArrayLike | None,
+    ) -> None:
+        position = _points(x, "x")
+        points = position if targets is None else _points(targets, "targets")
+        mass = _masses(m, len(position))
+        self.dtype = position.dtype
+        self.G = _number(G, "G")
+        softening = _number(softening, "softening", at_least=0.0)
+        self.method = _choice(method, METHODS, "method")
+        kernel = _choice(kernel, SOFTENINGS, "softening_kernel")
+        self.tolerance = _tolerance(tolerance, self.method, self.dtype)
+        self.apart = targets is not None
+
+        both = (position, points)
+        low, high = (
+            np.array([f(p, axis=0, initial=-s) for p in both])
+            for f, s in ((np.min, -np.inf), (np.max, np.inf))
+        )
+        self.low = low.min(axis=0).astype(np.float64)
+        self.length = _power_of_two(float((high.max(axis=0) - self.low).max()))
+        self.unit_mass = _power_of_two(float(mass.sum()))
+        self.position, self.points = position, points
+        self.mass = mass / self.unit_mass
+        self.law = kernel if softening > 0.0 else "newton"
+        self.size = softening * (SUPPORT if kernel == "spline" else 1.0) / self.length
+
+    def sums(self, potential: bool) -> NDArray[Any]:
+        """Sums of m s dx and m w over all sources (4, k), in these units."""
+        if not len(self.points) or not self.mass.any():
+            return np.zeros((4, len(self.points)))
+        if self.tolerance is None or self._few():
+            rows = (*self._scaled(self.position, 0.0).T, self.mass)
+            source = np.array(rows, self.dtype)
+            target = np.array(self._scaled(self.points, 0.0).T, self.dtype, order="C")
+            return direct(source, target, self.law, self.size, potential)
+        return multipole(
+            self._scaled(self.position, self.low),
+            self.mass,
+            self._scaled(self.points, self.low) if self.apart else None,
+            self.law,
+            self.size,
+            self.tolerance,
+            potential,
+        )
+
+    def acceleration(self, sums: NDArray[Any]) -> NDArray[Any]:
+        """(k, 3) in the caller's units."""
+        unit = self.G * self.unit_mass / self.length / self.length
+        scaled: NDArray[Any] = sums[:3].T * unit
+        return scaled.astype(self.dtype, order="C")
+
+    def potential(self, sums: NDArray[Any]) -> NDArray[Any]:
+        """(k,) in the caller's units, without what each particle adds to itself."""
+        depth = sums[3]
+        if not self.apart:
+            depth = depth - self.mass * center_depth(self.law, self.size)
+        scaled: NDArray[Any] = depth * (-self.G * self.unit_mass / self.length)
+        return scaled.astype(self.dtype)
+
+    def _scaled(self, points: NDArray[Any], low: NDArray[Any] | float) -> NDArray[np.float64]:
+        return (points.astype(np.float64) - low) / self.length
+
+    def _few(self) -> bool:
+        """Whether direct sums are asked for, or faster."""
+        if self.method == "auto" and self.tolerance is not None:
+            pairs_as_dear = crossover(self.tolerance, self.dtype)
+            return math.sqrt(len(self.position) * len(self.points)) < pairs_as_dear
+        return self.method == "direct"
+
+
+def crossover(tolerance: float, dtype: np.dtype[Any]) -> float:
+    """Number of particles from which the multipole method is faster than direct sums.
+
+    A fit to measurements on a processor with AVX-512; direct sums in double are slower, and a
+    tighter tolerance makes the multipole method slower.
+    """
+    digits = -math.log10(tolerance)
+    return (3000.0 if dtype == np.float32 else 1500.0) * max(digits, 2.0)
+
+
+def _points(values: ArrayLike, name: str) -> NDArray[Any]:
+    points = np.asarray(values)
+    if points.dtype != np.float32:
+        try:
+            points = points.astype(np.float64, casting="same_kind" if points.size else "unsafe")
+        except TypeError:
+            raise ValueError(f"{name} must be real numbers, not {points.dtype}.") from None
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise ValueError(f"{name} must have the shape (n, 3), not {points.shape}.")
+    _check_finite(points, name)
+    return points
+
+
+def _masses(values: ArrayLike, count: int) -> NDArray[np.float64]:
+    mass = np.asarray(values, np.float64)
+    if mass.shape != (count,):
+        raise ValueError(
+            f"m must have the shape ({count},), one mass per row of x, not {mass.shape}."
+        )
+    _check_finite(mass, "m")
+    if (mass < 0).any():
+        i = int(np.argmax(mass < 0))
+        raise ValueError(f"m[{i}] = {mass[i]:g}; masses must be at least 0.")
+    return mass
+
+
+def _check_finite(values: NDArray[Any], name: str) -> None:
+    if not np.isfinite(values).all():
+        i = tuple(int(k) for k in np.argwhere(~np.isfinite(values))[0])
+        place = ", ".join(str(k) for k in i)
+        raise ValueError(f"{name}[{place}] = {values[i]}; all values must be finite.")
+
+
+def _number(value: float, name: str, at_least: float = -math.inf) -> float:
+    number = float(value)
+    if not math.isfinite(number) or number < at_least:
+        bound = "" if at_least == -math.inf else f" of at least {at_least:g}"
+        raise ValueError(f"{name} = {number:g} must be a finite number{bound}.")
+    return number
+
+
+def _choice(value: str, menu: tuple[str, ...], name: str) -> str:
+    if value not in menu:
+        raise ValueError(
+            f"{name} {value!r} is none of {', '.join(menu)}.{likely(str(value), menu)}"
+        )
+    return value
+
+
+def _tolerance(tolerance: float | None, method: str, dtype: np.dtype[Any]) -> float | None:
+    if tolerance is None:
+        if method == "multipole":
+            raise ValueError('method "multipole" needs a tolerance, such as tolerance=1e-3.')
+        return None
+    number = _number(tolerance, "tolerance")
+    precision = "single" if dtype == np.float32 else "double"
+    least = TIGHTEST[precision]
+    if not least <= number < 1.0:
+        raise ValueError(
+            f"tolerance = {number:g} must be below 1 and at least {least:g} for positions in "
+            f"{precision} precision" + ("; give x as float64." if number < least else ".")
+        )
+    return number
+
+
+def _power_of_two(value: float) -> float:
+    return 2.0 ** math.frexp(value)[1] if value > 0.0 else 1.0

@@ -1,0 +1,83 @@
+"""What the walk over the tree may neglect, and its working memory."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.interact.gravity.expansions import Tables
+from motes.interact.gravity.lanes import LANES
+from motes.interact.gravity.morton import LEVELS
+from motes.interact.gravity.translations import Bench, bench
+
+SOURCES = 2048
+"""Sources that are packed for one sum over pairs: in single precision they fit the first cache."""
+
+_STACK = 8 * (LEVELS + 2)
+
+
+class Limits(NamedTuple):
+    """What the walk may neglect, and the pair law's lengths."""
+
+    opening2: float
+    """Square of the largest (r_A + r_B) / R at which expansions are used."""
+    error: float
+    """Largest estimated error of the acceleration by one use of an expansion."""
+    force: float
+    """Largest estimated error of that times the mass of the target cell: of its momentum."""
+    rounding: float
+    """Largest error of the acceleration by rounded coordinates in one sum over pairs."""
+    few: int
+    """Two leaves with a product of numbers of particles up to this are summed by pairs."""
+    size: float
+    """Length in the pair law: Plummer's softening, or the spline's support."""
+    reach: float
+    """Distance under which the pair law is not that of the expansions."""
+    e2: float
+    """Square of the softening in the expansions."""
+
+
+class Desk(NamedTuple):
+    """Working memory of one walk."""
+
+    bench: Bench
+    candidates: NDArray[np.int32]
+    """Source cells that are left for a target cell's children, lists of all levels end to end."""
+    waiting: NDArray[np.int32]
+    """(stack, 3) target cells, and where the lists that they inherit begin and end."""
+    opened: NDArray[np.int32]
+    """(stack,) source cells to test."""
+    local: NDArray[Any]
+    """(stack, basis) local terms of waiting target cells."""
+    gathered: NDArray[Any]
+    """(basis, lanes) local terms being summed."""
+    target: NDArray[Any]
+    """(3, largest leaf) targets as the pair law sees them."""
+    source: NDArray[Any]
+    """(5, SOURCES) packed sources: x, y, z, m, and m times the rounding of coordinates."""
+    spans: NDArray[np.int32]
+    """(SOURCES, 2) which particles they are."""
+    part: NDArray[Any]
+    """(5, largest leaf) sums over packed sources."""
+    total: NDArray[Any]
+    """(5, largest leaf) sums over all sources."""
+
+
+def desk(table: Tables, real: type, largest: int, capacity: int) -> Desk:
+    """Working memory for target leaves of at most `largest` and `capacity` candidates."""
+    width, basis = -(-largest // LANES) * LANES, len(table.degree)
+    return Desk(
+        bench=bench(table, real),
+        candidates=np.empty(capacity, np.int32),
+        waiting=np.empty((_STACK, 3), np.int32),
+        opened=np.empty(_STACK, np.int32),
+        local=np.empty((_STACK, basis), real),
+        gathered=np.empty((basis, LANES), real),
+        target=np.zeros((3, width), real),
+        source=np.zeros((5, SOURCES), real),
+        spans=np.empty((SOURCES, 2), np.int32),
+        part=np.zeros((5, width), real),
+        total=np.zeros((5, width), real),
+    )

@@ -1,0 +1,109 @@
+"""Order of particles along Morton's curve: neighbours in the order are neighbours in space."""
+
+# mypy: disallow-untyped-decorators=False
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.jit import jit, share
+
+LEVELS = 21
+"""Levels of an octree that fit into a key: bits for each of x, y, z."""
+
+_BITS = 11
+_BLOCKS = 16
+
+
+@jit(inline=True)
+def _spaced(value: Any) -> Any:
+    """Bits of a number of 21 bits, three apart."""
+    v = np.uint64(value)
+    v = (v | (v << np.uint64(32))) & np.uint64(0x001F00000000FFFF)
+    v = (v | (v << np.uint64(16))) & np.uint64(0x001F0000FF0000FF)
+    v = (v | (v << np.uint64(8))) & np.uint64(0x100F00F00F00F00F)
+    v = (v | (v << np.uint64(4))) & np.uint64(0x10C30C30C30C30C3)
+    return (v | (v << np.uint64(2))) & np.uint64(0x1249249249249249)
+
+
+@jit
+def _write_keys(position: Any, low: Any, scale: Any, key: Any, order: Any, first: Any) -> None:
+    for i in range(key.size):
+        k = first + i
+        x = _spaced((position[k, 0] - low[0]) * scale)
+        y = _spaced((position[k, 1] - low[1]) * scale)
+        z = _spaced((position[k, 2] - low[2]) * scale)
+        key[i] = (x << np.uint64(2)) | (y << np.uint64(1)) | z
+        order[i] = k
+
+
+@jit
+def _count(key: Any, shift: Any, histogram: Any) -> None:
+    histogram[:] = 0
+    for i in range(key.size):
+        histogram[np.intp((key[i] >> shift) & np.uint64(histogram.size - 1))] += 1
+
+
+@jit
+def _accumulate(histograms: Any) -> None:
+    total = 0
+    for digit in range(histograms.shape[1]):
+        for block in range(histograms.shape[0]):
+            count = histograms[block, digit]
+            histograms[block, digit] = total
+            total += count
+
+
+@jit
+def _scatter(key: Any, order: Any, shift: Any, place: Any, new_key: Any, new_order: Any) -> None:
+    for i in range(key.size):
+        digit = np.intp((key[i] >> shift) & np.uint64(place.size - 1))
+        new_key[place[digit]] = key[i]
+        new_order[place[digit]] = order[i]
+        place[digit] += 1
+
+
+def morton_order(
+    position: NDArray[np.float64], low: NDArray[np.float64], size: float
+) -> tuple[NDArray[np.uint64], NDArray[np.uint32]]:
+    """Sorted keys and the order that sorts, of positions (n, 3) in a cube at `low`.
+
+    A stable radix sort; equal keys keep the order of rows.
+    """
+    n = len(position)
+    cuts = [n * block // _BLOCKS for block in range(_BLOCKS + 1)]
+    key, order = np.empty(n, np.uint64), np.empty(n, np.uint32)
+    new_key, new_order = np.empty_like(key), np.empty_like(order)
+    histograms = np.empty((_BLOCKS, 1 << _BITS), np.uint32)
+    scale = (1 << LEVELS) / size * (1 - 2.0**-40)
+
+    def write(block: int) -> None:
+        rows = slice(cuts[block], cuts[block + 1])
+        _write_keys(position, low, scale, key[rows], order[rows], cuts[block])
+
+    share(write, _BLOCKS)
+    for bit in range(0, 3 * LEVELS, _BITS):
+        shift = np.uint64(bit)
+
+        def count(block: int, key: Any = key, shift: Any = shift) -> None:
+            _count(key[cuts[block] : cuts[block + 1]], shift, histograms[block])
+
+        share(count, _BLOCKS)
+        if histograms.sum(axis=0).max() == n:
+            continue
+        _accumulate(histograms)
+
+        def scatter(
+            block: int,
+            old: Any = (key, order),
+            new: Any = (new_key, new_order),
+            shift: Any = shift,
+        ) -> None:
+            rows = slice(cuts[block], cuts[block + 1])
+            _scatter(old[0][rows], old[1][rows], shift, histograms[block], *new)
+
+        share(scatter, _BLOCKS)
+        key, order, new_key, new_order = new_key, new_order, key, order
+    return key, order

@@ -1,0 +1,240 @@
+"""A linear octree: cells as rows of arrays, in depth-first order, with what they contain."""
+
+# mypy: disallow-untyped-decorators=False
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.interact.gravity.expansions import Tables
+from motes.interact.gravity.morton import LEVELS, morton_order
+from motes.interact.gravity.translations import (
+    Bench,
+    bench,
+    moments_to_moments,
+    particles_to_moments,
+)
+from motes.jit import jit, share
+
+START, END, SKIP = 0, 1, 2
+X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
+
+
+class Tree(NamedTuple):
+    """Particles in Morton order and the cells of their octree, as kernels take them.
+
+    A cell's children are the row after it, that one's SKIP, that one's SKIP ... until the cell's
+    own SKIP; a leaf's SKIP is the row after it.
+    """
+
+    cells: NDArray[np.int32]
+    """(cells, 3) particles START to END, and SKIP, the row after the last descendant."""
+    bodies: NDArray[np.float64]
+    """(cells, 5) center of mass, distance of the particle farthest from it, mass."""
+    order: NDArray[np.uint32]
+    """(n,) row of each particle in the arrays that it came from."""
+    place: NDArray[np.float64]
+    """(4, n) x, y, z, m"""
+    near: NDArray[Any]
+    """(4, n) for single precision: x, y, z from the leaf's center, m; else `place`."""
+    moments: NDArray[Any]
+    """(cells, basis)"""
+
+
+@jit
+def _divide(key: Any, leaf: Any, cells: Any) -> Any:
+    """Write START and END of all cells; return their number, or 0 if there is no room."""
+    stack = np.empty((8 * LEVELS + 1, 3), np.int64)
+    stack[0, 0], stack[0, 1], stack[0, 2] = 0, key.size, 0
+    depth, count = 1, 0
+    while depth > 0:
+        depth -= 1
+        start, end, level = stack[depth]
+        if count == cells.shape[0]:
+            return 0
+        cells[count, START], cells[count, END] = start, end
+        count += 1
+        if end - start <= leaf:
+            continue
+        shift = np.uint64(3 * (LEVELS - 1 - level))
+        while level < LEVELS and key[start] >> shift == key[end - 1] >> shift:
+            level += 1
+            shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
+        if level == LEVELS:
+            continue
+        high = end
+        while high > start:
+            octant = key[high - 1] >> shift
+            low, above = start, high - 1
+            while low < above:
+                middle = (low + above) // 2
+                if key[middle] >> shift < octant:
+                    low = middle + 1
+                else:
+                    above = middle
+            stack[depth, 0], stack[depth, 1], stack[depth, 2] = low, high, level + 1
+            depth += 1
+            high = low
+    for back in range(count):
+        cell = count - 1 - back
+        after = cell + 1
+        while after < count and cells[after, END] <= cells[cell, END]:
+            after = cells[after, SKIP]
+        cells[cell, SKIP] = after
+    return count
+
+
+@jit
+def _permute(position: Any, mass: Any, order: Any, place: Any, first: Any, last: Any) -> None:
+    for i in range(first, last):
+        k = order[i]
+        place[0, i] = position[k, 0]
+        place[1, i] = position[k, 1]
+        place[2, i] = position[k, 2]
+        place[3, i] = mass[k]
+
+
+@jit
+def _summarize(
+    tree: Tree, first: Any, last: Any, table: Tables, bench: Bench, shifted: Any, near: bool
+) -> None:
+    """Fill the rows of `bodies` and `moments` of cells `first` to `last`, children before parents.
+
+    `shifted` (4, largest leaf) is working memory; `near`: fill `tree.near` as well.
+    """
+    cells, bodies, place = tree.cells, tree.bodies, tree.place
+    for back in range(last - first):
+        cell = last - 1 - back
+        start, end, skip = cells[cell, START], cells[cell, END], cells[cell, SKIP]
+        is_leaf = skip == cell + 1
+        mass = x = y = z = 0.0
+        if is_leaf:
+            for i in range(start, end):
+                m = place[3, i]
+                mass += m
+                x += m * place[0, i]
+                y += m * place[1, i]
+                z += m * place[2, i]
+        else:
+            child = cell + 1
+            while child < skip:
+                m = bodies[child, MASS]
+                mass += m
+                x += m * bodies[child, X]
+                y += m * bodies[child, Y]
+                z += m * bodies[child, Z]
+                child = cells[child, SKIP]
+        if mass > 0.0:
+            x, y, z = x / mass, y / mass, z / mass
+        else:
+            x, y, z = place[0, start], place[1, start], place[2, start]
+        r2 = 0.0
+        for i in range(start, end):
+            dx, dy, dz = place[0, i] - x, place[1, i] - y, place[2, i] - z
+            r2 = max(r2, dx * dx + dy * dy + dz * dz)
+        radius = np.sqrt(r2)
+        bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
+        bodies[cell, RADIUS], bodies[cell, MASS] = radius, mass
+        h = cell_unit(radius)
+        if is_leaf:
+            count = end - start
+            for i in range(count):
+                shifted[0, i] = place[0, start + i] - x
+                shifted[1, i] = place[1, start + i] - y
+                shifted[2, i] = place[2, start + i] - z
+                shifted[3, i] = place[3, start + i]
+            if near:
+                for row in range(4):
+                    for i in range(count):
+                        tree.near[row, start + i] = shifted[row, i]
+            if tree.moments.shape[0] > 0:
+                scale = table.factor.dtype.type(1.0 / h)
+                particles_to_moments(table, bench, shifted, count, scale, tree.moments[cell])
+        elif tree.moments.shape[0] > 0:
+            bench.place[:] = 0
+            child, lane = cell + 1, 0
+            while child < skip:
+                bench.place[0, lane] = (x - bodies[child, X]) / h
+                bench.place[1, lane] = (y - bodies[child, Y]) / h
+                bench.place[2, lane] = (z - bodies[child, Z]) / h
+                bench.place[3, lane] = 1
+                bench.ratio[lane] = cell_unit(bodies[child, RADIUS]) / h
+                for row in range(tree.moments.shape[1]):
+                    bench.moments[row, lane] = tree.moments[child, row]
+                child = cells[child, SKIP]
+                lane += 1
+            moments_to_moments(table, bench, tree.moments[cell])
+
+
+@jit(inline=True)
+def cell_unit(radius: Any) -> Any:
+    """Unit of length of a cell's expansions: its radius, or any positive length for a point."""
+    return max(radius, 1e-12)
+
+
+def octree(position: NDArray[np.float64], mass: NDArray[np.float64], leaf: int) -> Tree:
+    """Sort and divide particles (n, 3) with masses (n,) until no cell has more than `leaf`.
+
+    Particles that share a key, closer than 2^-21 of the whole, stay in one leaf.
+    """
+    low = position.min(axis=0)
+    size = float((position.max(axis=0) - low).max()) or 1.0
+    key, order = morton_order(position, low, size)
+    capacity, count = 64 + 4 * len(key) // leaf, 0
+    while not count:
+        capacity *= 2
+        cells = np.empty((capacity, 3), np.int32)
+        count = _divide(key, leaf, cells)
+    place = np.empty((4, len(key)))
+    size_of_block = 1 << 16
+
+    def permute(block: int) -> None:
+        first = block * size_of_block
+        _permute(position, mass, order, place, first, min(first + size_of_block, len(key)))
+
+    share(permute, -(-len(key) // size_of_block))
+    nothing = np.empty((0, 0))
+    return Tree(cells[:count].copy(), np.empty((count, 5)), order, place, place, nothing)
+
+
+def summarize(tree: Tree, table: Tables, real: type, sources: bool) -> Tree:
+    """The tree with bodies, and for `sources` moments, filled in from places and masses."""
+    branches, stem = divide_work(tree)
+    count = len(tree.cells) if sources else 0
+    near = np.empty(tree.place.shape, real) if real is np.float32 else tree.place
+    tree = tree._replace(moments=np.zeros((count, len(table.kept)), real), near=near)
+    largest = largest_leaf(tree)
+
+    def fill(first: int, last: int) -> None:
+        shifted: NDArray[Any] = np.empty((4, largest), real)
+        _summarize(tree, first, last, table, bench(table, real), shifted, near is not tree.place)
+
+    share(lambda k: fill(branches[k], int(tree.cells[branches[k], SKIP])), len(branches))
+    for cell in reversed(stem):
+        fill(cell, cell + 1)
+    return tree
+
+
+def largest_leaf(tree: Tree) -> int:
+    """Most particles in a leaf."""
+    cells = tree.cells
+    leaves = cells[:, SKIP] == np.arange(1, len(cells) + 1)
+    return int((cells[leaves, END] - cells[leaves, START]).max())
+
+
+def divide_work(tree: Tree) -> tuple[list[int], list[int]]:
+    """Cells whose descendants are one task each, and the cells above them."""
+    n = tree.place.shape[1]
+    limit = min(max(n // 64, 64), 8192)
+    branches, stem, cell = [], [], 0
+    while cell < len(tree.cells):
+        start, end, skip = (int(v) for v in tree.cells[cell])
+        if end - start <= limit or skip == cell + 1:
+            branches.append(cell)
+            cell = skip
+        else:
+            stem.append(cell)
+            cell += 1
+    return branches, stem

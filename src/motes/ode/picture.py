@@ -1,0 +1,239 @@
+"""Pictures of a problem and what methods make of it, clear enough for a slide."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from motes.errors import MissingExtra
+from motes.integrate import table as find
+from motes.ode.arithmetic import Array
+from motes.ode.solution import Work
+from motes.ode.solve import solve
+from motes.ode.solve_newton import solve_newton
+from motes.ode.stability import growth
+from motes.problem import Problem, about, problem
+from motes.tableau import Nystrom, Splitting
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Okabe and Ito's colours: told apart with every kind of colour vision."""
+
+MARKS = "osD^vP*"
+HALVINGS = 5
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one method makes of a problem at one step."""
+
+    t: Array
+    y: Array
+    work: Work
+
+    @property
+    def whole(self) -> bool:
+        """Whether it reached the end with finite numbers."""
+        return self.work.success and bool(np.isfinite(self.y).all())
+
+
+def run(of: Problem, method: str, step: float | None, **options: Any) -> Run:
+    """Solve a problem with fixed steps, or with `step` None within tolerances."""
+    if isinstance(find(method), Splitting | Nystrom):
+        if of.acceleration is None:
+            raise ValueError(f"\"{method}\" is for x'' = a(t, x), which this problem is not")
+        x, v = np.split(np.array(of.start), 2)
+        n = solve_newton(of.acceleration, x, v, of.span, method=method, step=step, **options)
+        return Run(n.t, np.concatenate([n.x, n.v], axis=1), n)
+    r = solve(of.f, of.start, of.span, method=method, step=step, **options)
+    return Run(r.t, r.y, r)
+
+
+def draw(
+    name: str, *, methods: Sequence[str] | None = None, steps: Sequence[float] | None = None
+) -> Figure:
+    """Five views of a problem as one Matplotlib figure.
+
+    The paths of all methods at the first step; the error at the end against the step, with the
+    measured slope; energy, or a component, over time; the first method's region of stability with
+    h lambda of the problem in it; the error against evaluations.
+
+    Args:
+        name: a problem of `motes.problem`.
+        methods: names of methods; without it, those that suit the problem.
+        steps: the first is the one whose path is drawn, all are lengths to measure errors at;
+            with one or none, it is halved.
+
+    Raises:
+        MissingExtra: Matplotlib is not installed.
+        SceneError: there is no such problem or method.
+        ValueError: a method or step that makes no sense.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise MissingExtra("pictures need Matplotlib: pip install 'motes[plot]'") from None
+    of = problem(name)
+    chosen = tuple(methods or of.methods)
+    lengths = list(steps or (of.step,))
+    if len(lengths) == 1:
+        lengths = [lengths[0] / 2**k for k in range(HALVINGS)]
+    reference = run(of, "verner9", None, rtol=1e-13, atol=1e-14)
+    exact = of.exact(reference.t) if of.exact else reference.y
+    runs = {method: [run(of, method, length) for length in lengths] for method in chosen}
+    paint = {
+        method: {"color": COLOURS[i % 7], "marker": MARKS[i % 7]} for i, method in enumerate(chosen)
+    }
+    figure = Figure(figsize=(14, 7.5), layout="constrained")
+    panes = figure.subplot_mosaic("PPEK;PPSW", width_ratios=[1, 1, 1.1, 1.1])
+    figure.suptitle(about(name), fontsize=12, wrap=True)
+    _paths(panes["P"], of, exact, {m: r[0] for m, r in runs.items()}, paint)
+    panes["P"].set_title(f"paths at step {lengths[0]:g}")
+    errors = {m: [_error(r, exact[-1]) for r in rs] for m, rs in runs.items()}
+    _errors(panes["E"], lengths, errors, paint)
+    _kept(panes["K"], of, reference.t, exact, {m: r[0] for m, r in runs.items()}, paint)
+    _region(panes["S"], of, chosen[0], lengths[0], exact)
+    _effort(panes["W"], runs, errors, paint)
+    return figure
+
+
+def _error(of: Run, exact: Array) -> float:
+    return float(np.linalg.norm(of.y[-1] - exact)) if of.whole else float("nan")
+
+
+def _paths(axes: Axes, of: Problem, exact: Array, runs: dict[str, Run], paint: Any) -> None:
+    shown = np.concatenate([exact[:, list(pair)] for pair in of.axes])
+    low, high = shown.min(0), shown.max(0)
+    margin = 0.3 * (high - low)
+    if of.labels[0] == "t":
+        margin[0] /= 10
+    elif of.labels == ("x", "y"):
+        margin[:] = margin.max()
+    axes.set_xlim(low[0] - margin[0], high[0] + margin[0])
+    axes.set_ylim(low[1] - margin[1], high[1] + margin[1])
+    if len(of.start) == 2:
+        _field(axes, of)
+    for i, j in of.axes:
+        axes.plot(exact[:, i], exact[:, j], color="0.6", lw=4, zorder=1, solid_capstyle="round")
+    for method, one in runs.items():
+        for number, (i, j) in enumerate(of.axes):
+            axes.plot(
+                one.y[:, i], one.y[:, j], lw=1, ms=3.5, markevery=max(1, len(one.y) // 60),
+                label=method if number == 0 else None, **paint[method],
+            )  # fmt: skip
+    if of.labels == ("x", "y"):
+        axes.set_aspect("equal")
+    axes.set_xlabel(of.labels[0])
+    axes.set_ylabel(of.labels[1])
+    axes.legend(loc="upper right", title="grey: exact", framealpha=0.95)
+
+
+def _field(axes: Axes, of: Problem) -> None:
+    """The slopes as arrows of equal length."""
+    x, y = np.meshgrid(np.linspace(*axes.get_xlim(), 17), np.linspace(*axes.get_ylim(), 17))
+    i, j = of.axes[0]
+    u, v = np.empty_like(x), np.empty_like(x)
+    for place in np.ndindex(x.shape):
+        state = np.empty(2)
+        state[[i, j]] = x[place], y[place]
+        slope = of.f(of.span[0], state)
+        u[place], v[place] = slope[i], slope[j]
+    size = np.hypot(u, v) + 1e-300
+    axes.quiver(x, y, u / size, v / size, color="0.85", angles="xy", zorder=0, width=0.003)
+
+
+def _errors(axes: Axes, lengths: list[float], errors: dict[str, list[float]], paint: Any) -> None:
+    for method, values in errors.items():
+        error = np.array(values)
+        good = np.isfinite(error) & (error > 1e-13) & (error < 1e3)
+        slope = ""
+        if good.sum() >= 2:
+            # The two shortest steps: the order shows where the error is small.
+            log_h, log_e = np.log(np.array(lengths)[good][-2:]), np.log(error[good][-2:])
+            slope = f": {np.diff(log_e)[0] / np.diff(log_h)[0]:.1f}"
+        axes.loglog(
+            np.array(lengths)[good], error[good], ms=5, lw=1.2, **paint[method],
+            label=f"{method}{slope}",
+        )  # fmt: skip
+    axes.set_title("error at the end, and its slope")
+    axes.set_xticks(lengths, [f"{length:.3g}" for length in lengths])
+    axes.minorticks_off()
+    axes.set_xlabel("step")
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.3)
+
+
+def _kept(
+    axes: Axes, of: Problem, t: Array, exact: Array, runs: dict[str, Run], paint: Any
+) -> None:
+    if of.energy is None:
+        axes.set_title(f"{of.labels[0] if of.labels[0] != 't' else of.labels[1]} over time")
+        place = of.axes[0][1 if of.labels[0] == "t" else 0]
+        axes.plot(t, exact[:, place], color="0.6", lw=4)
+        low, high = exact[:, place].min(), exact[:, place].max()
+        for method, one in runs.items():
+            axes.plot(one.t, one.y[:, place], lw=1, color=paint[method]["color"])
+        axes.set_ylim(low - 0.5 * (high - low), high + 0.5 * (high - low))
+    else:
+        axes.set_title("error of the energy over time")
+        axes.set_yscale("log")
+        for method, one in runs.items():
+            finite = np.abs(one.y).max(-1) < 1e6
+            energy = of.energy(one.y[finite])
+            error = np.abs(energy - energy[0]) / max(abs(energy[0]), 1e-300)
+            axes.plot(one.t[finite], np.maximum(error, 1e-16), lw=1.2, color=paint[method]["color"])
+    axes.set_xlabel("time")
+    axes.grid(alpha=0.3)
+
+
+def _region(axes: Axes, of: Problem, method: str, step: float, exact: Array) -> None:
+    """Where one step does not grow, and h lambda along the exact path."""
+    places = exact[:: max(1, len(exact) // 20)]
+    values = np.concatenate([step * np.linalg.eigvals(_jacobian(of, y)) for y in places])
+    reach = max(4.0, min(1.3 * float(np.abs(values).max()), 30.0))
+    x, y = np.meshgrid(np.linspace(-reach, reach / 2, 151), np.linspace(-reach, reach, 201))
+    size = growth(find(method))(x + 1j * y)
+    # A little more than 1, so that the axis on which splittings are stable can be seen.
+    axes.contourf(x, y, size, levels=[0, 1.01], colors=["#cfe6f5"])
+    axes.contour(x, y, size, levels=[1.01], colors=[COLOURS[0]], linewidths=1)
+    axes.plot(values.real, values.imag, "x", ms=5, color=COLOURS[1], label="step x eigenvalues")
+    axes.axhline(0, color="0.7", lw=0.8)
+    axes.axvline(0, color="0.7", lw=0.8)
+    axes.set_title(f"{method}: stable where blue")
+    axes.set_xlabel("real part")
+    axes.set_ylabel("imaginary part")
+    axes.set_aspect("equal", adjustable="box")
+    axes.legend(fontsize=8, loc="upper right")
+
+
+def _jacobian(of: Problem, y: Array) -> Array:
+    """df/dy by central differences."""
+    result = np.empty((y.size, y.size))
+    f = partial(of.f, of.span[0])
+    for i in range(y.size):
+        step = np.zeros_like(y)
+        step[i] = 1e-5 * max(1.0, abs(y[i]))
+        result[:, i] = (f(y + step) - f(y - step)) / (2 * step[i])
+    return result
+
+
+def _effort(
+    axes: Axes, runs: dict[str, list[Run]], errors: dict[str, list[float]], paint: Any
+) -> None:
+    for method, rs in runs.items():
+        error = np.array(errors[method])
+        good = np.isfinite(error) & (error > 1e-15) & (error < 1e3)
+        evaluations = np.array([r.work.evaluations for r in rs])
+        axes.loglog(error[good], evaluations[good], ms=5, lw=1.2, **paint[method])
+    axes.invert_xaxis()
+    axes.set_title("work and precision")
+    axes.set_xlabel("error at the end")
+    axes.set_ylabel("evaluations")
+    axes.grid(alpha=0.3)

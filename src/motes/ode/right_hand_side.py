@@ -1,0 +1,189 @@
+"""The user's functions, compiled or not, in the one form that the solvers call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+from motes.jit import EXACT, jit
+from motes.ode.arithmetic import Kernel
+
+Function = Callable[..., Any]
+
+
+def compiled(*functions: Function) -> bool:
+    """Whether all of these are Numba functions, so that a whole solve can be machine code."""
+    return all(isinstance(function, Dispatcher) for function in functions)
+
+
+class Wrap(NamedTuple):
+    """What is done to the parts of a solver: compiled around compiled functions, or left alone."""
+
+    loop: Callable[[Function], Kernel]
+    """For what Python calls."""
+    part: Callable[[Function], Kernel]
+    """For what only loops call."""
+
+
+COMPILED = Wrap(jit, lambda function: jit(function, inline=True))
+PLAIN = Wrap(lambda function: function, lambda function: function)
+
+
+def wrap(functions: Sequence[Function]) -> Wrap:
+    """Whether these functions can be parts of machine code."""
+    return COMPILED if compiled(*functions) else PLAIN
+
+
+def slope(f: Function, shape: tuple[int, ...]) -> Kernel:
+    """slope(t, y, out, args): out = f(t, y in its shape, *args), from an array or a tuple."""
+    if not compiled(f):
+
+        def call(t, y, out, args):  # type: ignore[no-untyped-def]
+            out[:] = np.asarray(f(t, y.reshape(shape), *args)).reshape(-1)
+
+        return call
+    f = _fused(f)
+    if not shape:
+
+        def number(t, y, out, args):  # type: ignore[no-untyped-def]
+            out[0] = f(t, y[0], *args)
+
+        return jit(number)
+    if len(shape) == 1:
+        size = shape[0]
+
+        def vector(t, y, out, args):  # type: ignore[no-untyped-def]
+            value = f(t, y, *args)
+            for i in range(size):
+                out[i] = value[i]
+
+        return jit(vector)
+
+    def block(t, y, out, args):  # type: ignore[no-untyped-def]
+        out[:] = f(t, y.reshape(shape), *args).ravel()
+
+    return jit(block)
+
+
+def acceleration(f: Function, shape: tuple[int, ...], skip: int) -> Kernel:
+    """acceleration(t, x, v, out, args): out = f(t, x, v, *args[skip:]) in the shape of x."""
+    if not compiled(f):
+
+        def call(t, x, v, out, args):  # type: ignore[no-untyped-def]
+            value = f(t, x.reshape(shape), v.reshape(shape), *args[skip:])
+            out[:] = np.asarray(value).reshape(-1)
+
+        return call
+    f = _fused(f)
+    if not shape:
+
+        def number(t, x, v, out, args):  # type: ignore[no-untyped-def]
+            out[0] = f(t, x[0], v[0], *args[skip:])
+
+        return jit(number)
+    if len(shape) == 1:
+        size = shape[0]
+
+        def vector(t, x, v, out, args):  # type: ignore[no-untyped-def]
+            value = f(t, x, v, *args[skip:])
+            for i in range(size):
+                out[i] = value[i]
+
+        return jit(vector)
+
+    def block(t, x, v, out, args):  # type: ignore[no-untyped-def]
+        out[:] = f(t, x.reshape(shape), v.reshape(shape), *args[skip:]).ravel()
+
+    return jit(block)
+
+
+def first_order(f: Function, shape: tuple[int, ...]) -> Function:
+    """y' = (v, f(t, x, v)) for y = (x, v) of shape (2, ...), compiled where f is."""
+    if not compiled(f):
+
+        def plain(t, y, *args):  # type: ignore[no-untyped-def]
+            return np.stack([y[1], np.asarray(f(t, y[0], y[1], *args)).reshape(shape)])
+
+        return plain
+    write = acceleration(f, shape, 0)
+
+    def pair(t, y, *args):  # type: ignore[no-untyped-def]
+        out = np.empty_like(y)
+        out[0] = y[1]
+        flat = out.reshape(-1)
+        both = y.reshape(-1)
+        n = flat.size // 2
+        write(t, both[:n], both[n:], flat[n:], args)
+        return out
+
+    result: Function = jit(pair)
+    return result
+
+
+def of_position_and_velocity(event: Function) -> Function:
+    """g(t, y) with y = (x, v) from g(t, x, v), compiled where that is."""
+
+    def pair(t, y, *args):  # type: ignore[no-untyped-def]
+        return event(t, y[0], y[1], *args)
+
+    return jit(pair) if compiled(event) else pair
+
+
+def _fused(f: Any) -> Kernel:
+    """The same Numba function with fused multiply-add, which saves a fifth of its time.
+
+    One that asks for more, such as parallel loops, checks of bounds or fast arithmetic, stays.
+    """
+    asked = {name for name, value in f.targetoptions.items() if value}
+    return jit(f.py_func, flags=EXACT) if asked <= _PLAIN_OPTIONS else f
+
+
+_PLAIN_OPTIONS = {"nopython", "error_model", "nogil", "cache"}
+
+
+def nothing(wrap: Wrap) -> Kernel:
+    """watch(t, y, g, args) of no events."""
+
+    @wrap.part
+    def watch(t, y, g, args):  # type: ignore[no-untyped-def]
+        pass
+
+    return watch
+
+
+def watcher(events: Sequence[Function], shape: tuple[int, ...], wrap: Wrap) -> Kernel | None:
+    """watch(t, y, g, args): the value of every event into g; None where there is none."""
+    if not events:
+        return None
+    if wrap is PLAIN:
+
+        def watch(t, y, g, args):  # type: ignore[no-untyped-def]
+            for i, event in enumerate(events):
+                g[i] = event(t, y.reshape(shape), *args)
+
+        return watch
+
+    chain = nothing(wrap)
+    for place, event in enumerate(events):
+        chain = _link(chain, event, place, shape)
+    return chain
+
+
+def _link(before: Kernel, event: Function, place: int, shape: tuple[int, ...]) -> Kernel:
+    """One more event after those before it: Numba cannot loop over functions of several types."""
+    if not shape:
+
+        def number(t, y, g, args):  # type: ignore[no-untyped-def]
+            before(t, y, g, args)
+            g[place] = event(t, y[0], *args)
+
+        return jit(number)
+
+    def link(t, y, g, args):  # type: ignore[no-untyped-def]
+        before(t, y, g, args)
+        g[place] = event(t, y.reshape(shape), *args)
+
+    return jit(link)

@@ -1,0 +1,14 @@
+"""A planet on an ellipse of eccentricity 0.5: who keeps the energy, and who the place?"""
+
+import numpy as np
+
+from motes.problem import Problem
+
+problem = Problem(
+    acceleration=lambda t, x, v: -x / np.hypot(x[0], x[1]) ** 3,
+    start=(0.5, 0.0, 0.0, np.sqrt(3.0)),
+    span=(0.0, 6 * np.pi),
+    step=0.05,
+    methods=("euler", "semi_implicit_euler", "leapfrog", "yoshida4", "rk4"),
+    energy=lambda y: (y[:, 2:] ** 2).sum(-1) / 2 - 1 / np.hypot(y[:, 0], y[:, 1]),
+)

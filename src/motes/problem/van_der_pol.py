@@ -1,0 +1,12 @@
+"""Van der Pol's oscillator: long slow stretches and sudden jumps, the more so the stiffer it is."""
+
+from motes.problem import Problem
+
+problem = Problem(
+    slope=lambda t, y: (y[1], 5.0 * (1 - y[0] ** 2) * y[1] - y[0]),
+    start=(2.0, 0.0),
+    span=(0.0, 12.0),
+    step=0.05,
+    methods=("euler", "rk4", "tsit5", "radau5", "rodas4"),
+    labels=("x", "speed"),
+)

@@ -1,0 +1,136 @@
+"""Laws of implicit methods: orders, stability at any step, stiff reference figures, Jacobians."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from motes import ode
+from motes.integrate import methods
+
+IMPLICIT = [name for name, table in methods().items() if table.implicit]
+L_STABLE = ["backward_euler", "bdf2", "kencarp4", "radau5", "rodas4", "sdirk2"]
+
+
+def driven(t, y):
+    return -y[1] * (1 + 0.3 * y[0]), y[0] * (1 + 0.2 * np.sin(t))
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_measured_order_is_declared_order(method):
+    """Halving the step divides the error by 2^order."""
+    order = methods()[method].order
+    n = {1: 200, 2: 60, 4: 20, 5: 12}[order]
+    exact = ode.solve(driven, [1.0, 0.0], (0, 6), method="verner9", step=0.01).y[-1]
+    errors = [
+        np.linalg.norm(
+            ode.solve(driven, [1.0, 0.0], (0, 6), method=method, step=6 / m).y[-1] - exact
+        )
+        for m in (n, 2 * n)
+    ]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_dense_output_has_the_order_of_the_method(method):
+    """Its largest error falls as h^order, as that of the steps does."""
+    order = methods()[method].order
+    n = {1: 60, 2: 30, 4: 12, 5: 8}[order]
+    times = np.linspace(0, 3, 31)
+    exact = np.column_stack([np.cos(times), np.sin(times)])
+    errors = []
+    for m in (n, 2 * n):
+        r = ode.solve(lambda t, y: (-y[1], y[0]), [1.0, 0.0], (0, 3), method=method, step=3 / m)
+        errors.append(np.abs(r(times) - exact).max())
+    assert np.log2(errors[0] / errors[1]) > order - 0.4
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_stiff_decay_never_grows(method):
+    """x' = -k x at h = 1e6 / k: A-stable methods do not grow, L-stable ones all but end it."""
+    k = 1000.0
+    r = ode.solve(lambda t, x: -k * x, 1.0, (0, 1e4), method=method, step=1e6 / k)
+    assert (np.abs(r.y) <= 1).all()
+    if method in L_STABLE:
+        assert abs(r.y[-1]) < 1e-20
+
+
+def test_backward_euler_divides_stiff_decay_by_eleven():
+    """x' = -k x, k = 1000, h = 0.01: implicit Euler multiplies by 1 / 11."""
+    r = ode.solve(lambda t, x: -1000 * x, 1.0, (0, 0.1), method="backward_euler", step=0.01)
+    assert r.y == pytest.approx(11.0 ** -np.arange(11), rel=1e-10)
+
+
+def test_radius_on_the_circle():
+    """Implicit Euler shrinks by 1 / sqrt(1 + h^2); midpoint and trapezoid keep the radius."""
+    for method, factor in (
+        ("backward_euler", (1 + 0.5**2) ** -0.5),
+        ("implicit_midpoint", 1.0),
+        ("trapezoid", 1.0),
+    ):
+        r = ode.solve(lambda t, y: (-y[1], y[0]), [1.0, 0.0], (0, 10), method=method, step=0.5)
+        radius = np.hypot(*r.y.T)
+        assert radius == pytest.approx(factor ** np.arange(21), rel=1e-11)
+
+
+def van_der_pol(t, y):
+    return y[1], 1000 * (1 - y[0] ** 2) * y[1] - y[0]
+
+
+@pytest.mark.parametrize("method", ["kencarp4", "radau5", "rodas4"])
+def test_stiff_van_der_pol_ends_where_the_test_set_says(method):
+    """mu = 1000 to t = 2000: y = 1.706167732170483, -8.928097010247975e-4 (IVP test set)."""
+    r = ode.solve(van_der_pol, [2.0, 0.0], (0, 2000), method=method, rtol=1e-6, atol=1e-8)
+    assert r.success
+    assert r.steps < 2000
+    assert r.y[-1] == pytest.approx([1.706167732170483, -8.928097010247975e-4], rel=1e-4)
+
+
+def test_every_way_to_the_jacobian_leads_to_the_same_solution():
+    """Differences, coloured differences, the user's own, Krylov: heat on a rod, tridiagonal."""
+    n = 20
+
+    def heat(t, y):
+        wide = np.concatenate([[0.0], y, [0.0]])
+        return n * n * (wide[2:] - 2 * y + wide[:-2])
+
+    matrix = n * n * (np.eye(n, k=1) - 2 * np.eye(n) + np.eye(n, k=-1))
+    y0 = np.sin(np.pi * np.arange(1, n + 1) / (n + 1))
+    rate = 4 * n * n * np.sin(np.pi / 2 / (n + 1)) ** 2
+    used = {}
+    for name, newton in {
+        "differences": ode.Newton(),
+        "coloured": ode.Newton(sparsity=matrix != 0),
+        "given": ode.Newton(jacobian=lambda t, y: matrix),
+        "krylov": ode.Newton(solver="krylov"),
+    }.items():
+        r = ode.solve(heat, y0, (0, 0.1), method="sdirk2", step=0.005, newton=newton)
+        # The slowest mode decays as its own exponential, to the method's order.
+        assert r.y[-1] == pytest.approx(np.exp(-rate * 0.1) * y0, rel=2e-3)
+        used[name] = r.evaluations
+    assert used["given"] < used["coloured"] < used["differences"]
+    assert used["differences"] - used["given"] >= 20 * 20
+    # Three colours in twenty steps, and a few iterations more with an inexact matrix.
+    assert 20 * 3 <= used["coloured"] - used["given"] < 20 * 6
+
+
+def test_a_step_without_a_solution_is_named():
+    """y1 = y0 + h y1^2 has no real solution for h y0 > 1/4."""
+    r = ode.solve(lambda t, y: y**2, 1.0, (0, 5), method="backward_euler", step=1.0)
+    assert not r.success
+    assert "smaller step" in r.message
+
+
+def test_stability_on_the_axes():
+    """Euler 2, RK4 2.785 and 2.828 (Hairer and Wanner II, section IV.2); leapfrog h w = 2."""
+    facts = {m.name: m for m in ode.methods()}
+    assert facts["euler"].real == pytest.approx(2, abs=1e-5)
+    assert facts["rk4"].real == pytest.approx(2.785, abs=1e-3)
+    assert facts["rk4"].imaginary == pytest.approx(2.828, abs=1e-3)
+    assert facts["leapfrog"].imaginary == pytest.approx(2, abs=1e-4)
+    assert facts["euler"].imaginary == 0
+    for name in IMPLICIT:
+        assert facts[name].real == np.inf
+        assert facts[name].imaginary == np.inf
+    assert facts["dopri5"].embedded == 4
+    assert facts["rk4"].embedded is None
