@@ -85,7 +85,7 @@ def test_a_plummer_sphere_stays_in_equilibrium() -> None:
 
     The radii of n stars have a standard error of about 1 / sqrt(n), and relax by as much.
     """
-    n = 2000
+    n = 1000
     emitter = motes.emit.Plummer(burst=[{"count": n}])
     gravity = motes.interact.Gravity(G=1.0, softening=0.03, softening_kernel="plummer")
     sim = simulation(
@@ -103,7 +103,7 @@ def test_a_plummer_sphere_stays_in_equilibrium() -> None:
     assert start.virial_ratio == pytest.approx(1.0, abs=0.05)
     sim.run(steps=250)
     end = sim.measure()
-    assert radii() == pytest.approx(before, rel=0.06)
+    assert radii() == pytest.approx(before, rel=0.08)
     assert end.virial_ratio == pytest.approx(1.0, abs=0.05)
     assert end.energy == pytest.approx(start.energy, rel=2e-3)  # Leapfrog at h = 0.04: h^2.
     assert end.momentum == pytest.approx(start.momentum, abs=1e-12)
