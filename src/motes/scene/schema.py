@@ -195,6 +195,11 @@ _TABLES: dict[str, Schema] = {
             {key: {"type": "number", "minimum": 0, "maximum": most} for key, most in MOST.items()},
             ("count",),
         ),
-    }
+    },
+    "names": {
+        "type": "array",
+        "items": {"type": "string", "minLength": 1},
+        "uniqueItems": True,
+    },
 }
-"""Values that are lists of small tables, as `motes.control.tables` reads them."""
+"""Values that are lists of small tables or of names, as `motes.control.tables` reads them."""
