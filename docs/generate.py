@@ -48,7 +48,7 @@ MENU_PAGES = {"integrator": "[a method](integrate.md)"}
 
 def pages() -> dict[Path, str]:
     """Every generated page with its text."""
-    found = {REFERENCE / f"{kind}.md": _kind(kind) for kind in KINDS}
+    found = {REFERENCE / f"{kind}.md": _kind(kind) for kind in (*KINDS, "integrate")}
     found[REFERENCE / "scene.md"] = _kind(DOCUMENT)
     found[REFERENCE / "commands.md"] = _commands()
     found[REFERENCE / "gallery.md"] = _gallery()
@@ -214,7 +214,7 @@ def _pictures() -> str:
 def _overview() -> str:
     """All components by kind, each with a link to its page."""
     rows = []
-    for kind in KINDS:
+    for kind in (*KINDS, "integrate"):
         names = scene_methods() if kind == "integrate" else catalog(kind)
         link = f"[{_title(kind)}](docs/reference/{kind}.md)"
         rows.append((link, ", ".join(f"`{name}`" for name in names)))

@@ -24,7 +24,7 @@ LARGEST = 60_000
 INSTANT = 0.6
 """Share of the film at which a still is taken."""
 
-INSTANTS = {"fireworks": 0.75, "fountain": 0.9}
+INSTANTS = {"cluster": 0.25, "fireworks": 0.75, "fountain": 0.9, "plummer": 0.1, "ring": 0.4}
 """Shares for scenes that are better seen at another time."""
 
 

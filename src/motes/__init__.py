@@ -10,7 +10,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from motes import emit, flow, force, look, retire, solid
+    from motes import emit, flow, force, interact, look, retire, solid
     from motes.catalog import (
         Color,
         Flag,
@@ -61,6 +61,7 @@ __all__ = [
     "film",
     "flow",
     "force",
+    "interact",
     "load",
     "look",
     "quantity",

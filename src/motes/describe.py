@@ -68,7 +68,7 @@ class Group:
 
 def describe() -> tuple[Group, ...]:
     """Everything that a scene can hold: its tables, then kinds in the order of a time step."""
-    return tuple(describe_kind(kind) for kind in (DOCUMENT, *KINDS))
+    return tuple(describe_kind(kind) for kind in (DOCUMENT, *KINDS, "integrate"))
 
 
 def describe_kind(kind: str) -> Group:

@@ -16,7 +16,9 @@ from motes.diagnose import explain_infinity
 from motes.emission import Clock
 from motes.errors import SceneError, SimulationError, likely
 from motes.frame import Frame
+from motes.group import Group
 from motes.integrate import method
+from motes.record.energy import Matter, Measures, measure
 from motes.scene.address import component_address
 from motes.scene.document import Scene, System
 from motes.state import Particles, State
@@ -36,8 +38,11 @@ class Simulation:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.start = -scene.prewarm
+        self._lead_in = round(scene.prewarm / scene.step)
+        self.start = -self._lead_in * scene.step
+        """Scene time at which the first step begins: 0 less the steps nearest to the prewarm."""
         self._steppers = {s.name: self._stepper(s) for s in scene.systems}
+        self._groups = self._grouped()
         self._looks = {s.name: Look(s) for s in scene.systems}
         self._systems = {s.name: s for s in scene.systems}
         real = np.float32 if scene.precision == "single" else np.float64
@@ -49,8 +54,6 @@ class Simulation:
             self._state.systems[system.name] = Particles(system.name, real, moves, widths)
         self.work = 0
         """Particle-steps taken so far."""
-        self._lead_in = round(scene.prewarm / scene.step)
-        self.start = -self._lead_in * scene.step
         self._run(self._lead_in, None)
 
     def _stepper(self, system: System) -> Stepper:
@@ -86,6 +89,33 @@ class Simulation:
         clocks = [Clock(address, emitter, self.start) for address, emitter in emitters]
         return Stepper(compiled, clocks, scene.seed, system.capacity)
 
+    def _grouped(self) -> list[Group]:
+        """Groups of systems that interact, directly or through others."""
+        links = [set(part.values["systems"].document()) for part in self.scene.interact]
+        links = [link or set(self._steppers) for link in links]
+        for part, link in zip(self.scene.interact, links, strict=True):
+            for name in sorted(link - set(self._steppers)):
+                raise SceneError(
+                    f'interaction "{part.name}": no system "{name}".'
+                    f"{likely(name, self._steppers)} There are: {', '.join(self._steppers)}."
+                )
+        groups: list[set[str]] = []
+        for link in links:
+            touching = [group for group in groups if group & link]
+            groups = [group for group in groups if not group & link]
+            groups.append(link.union(*touching))
+        return [
+            Group(
+                {name: self._steppers[name] for name in sorted(group)},
+                tuple(
+                    (component_address(None, part), part)
+                    for part, link in zip(self.scene.interact, links, strict=True)
+                    if link & group
+                ),
+            )
+            for group in groups
+        ]
+
     @property
     def steps(self) -> int:
         """Steps taken since time 0."""
@@ -120,6 +150,22 @@ class Simulation:
     def digest(self) -> str:
         """One hash of the whole state: equal digests mean equal bits."""
         return self._state.digest()
+
+    def measure(self) -> Measures:
+        """Energy, momentum, angular momentum and virial ratio of all particles, now.
+
+        Particles that flows alone carry have no motion of their own and do not count.
+        """
+        systems, potential = self._state.systems, 0.0
+        matter = []
+        for name, rows in systems.items():
+            stepper, n = self._steppers[name], rows.count
+            if rows.moves:
+                mass = stepper.mass(rows, n)
+                matter.append(Matter(rows.position[:, :n], rows.velocity[:, :n], mass))
+                potential += float(mass @ stepper.system.potential(rows, self.time))
+        potential += sum(group.energy(systems, self.time) for group in self._groups)
+        return measure(self.time, matter, potential)
 
     def step(self) -> None:
         """Take one step."""
@@ -163,9 +209,13 @@ class Simulation:
         return (state.number + ahead - self._lead_in) * self.scene.step
 
     def _advance(self, state: State, interval: Interval) -> None:
+        grouped = {name for group in self._groups for name in group.steppers}
         for name in sorted(state.systems):
             self.work += state.systems[name].count
-            self._steppers[name].step(state.systems[name], interval)
+            if name not in grouped:
+                self._steppers[name].step(state.systems[name], interval)
+        for group in self._groups:
+            group.step(state.systems, interval)
         state.number += 1
 
     def _steps_before(self, time: float) -> int:

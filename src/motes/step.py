@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.compile.system import CompiledSystem
-from motes.emission import Clock
+from motes.emission import Clock, Source
 from motes.jit import blocks, share
 from motes.state import Particles
 
@@ -61,8 +61,7 @@ class Stepper:
 
     def step(self, rows: Particles, interval: Interval) -> None:
         """Take the system through one step, in place."""
-        alive = rows.count
-        self.births(rows, interval)
+        alive = self.births(rows, interval)
         exceptional = [
             self.integrate(rows, alive, interval),
             self.newborns(rows, alive, interval),
@@ -71,28 +70,46 @@ class Stepper:
         self.events()
         self.deaths(rows, interval)
 
-    def births(self, rows: Particles, interval: Interval) -> None:
-        """Append the newborns of the step, as they are at their own instants."""
-        for clock in self.clocks:
-            for source in clock.sources(interval.begin, interval.end):
-                count = len(source.times)
-                if self.capacity is not None:
-                    count = min(count, self.capacity - rows.count)
-                if count <= 0:
-                    continue
-                rows.reserve(count)
-                self._write(rows, clock.name, source.address, source.numbers, source.times, count)
-                rows.count += count
+    def mass(self, rows: Particles, alive: int) -> NDArray[Any]:
+        """Masses [kg] of the rows that were alive, (alive,)."""
+        address, control = self.system.motion.traits["mass"]
+        start = 0
+        for column in self.system.columns:
+            if column.address == address:
+                return rows.columns[start][:alive]
+            start += column.width
+        return np.full(alive, float(control.at(0.0)[0]), rows.real)
 
-    def _write(
-        self,
-        rows: Particles,
-        name: str,
-        address: int,
-        numbers: NDArray[np.uint64],
-        times: NDArray[np.float64],
-        count: int,
-    ) -> None:
+    def births(self, rows: Particles, interval: Interval) -> int:
+        """Append the newborns of the step, as they are at their own instants.
+
+        Returns how many rows are alive all through the step: those from before, and then those
+        that were born at the very instant at which it begins.
+        """
+        born = [
+            (clock.name, source)
+            for clock in self.clocks
+            for source in clock.sources(interval.begin, interval.end)
+        ]
+        at_once = [pair for pair in born if pair[1].times[-1] <= interval.begin]
+        later = [pair for pair in born if pair[1].times[-1] > interval.begin]
+        self._append(rows, at_once)
+        alive = rows.count
+        self._append(rows, later)
+        return alive
+
+    def _append(self, rows: Particles, born: list[tuple[str, Source]]) -> None:
+        for name, source in born:
+            count = len(source.times)
+            if self.capacity is not None:
+                count = min(count, self.capacity - rows.count)
+            if count <= 0:
+                continue
+            rows.reserve(count)
+            self._write(rows, name, source, count)
+            rows.count += count
+
+    def _write(self, rows: Particles, name: str, source: Source, count: int) -> None:
         emitter = self.system.emitters[name]
         channels, first = self.system.trait_channels, rows.count
         parts = _parts(count, 64)
@@ -101,8 +118,8 @@ class Stepper:
             low, high = parts[k]
             emitter.kernel(
                 rows.position, rows.velocity, rows.birth, rows.ids, rows.columns, first + low,
-                times[low:high], numbers[low:high], np.uint64(address), self.seed, emitter.K,
-                emitter.channels, self.system.K_traits, channels,
+                source.times[low:high], source.numbers[low:high], np.uint64(source.address),
+                self.seed, emitter.K, emitter.channels, self.system.K_traits, channels,
             )  # fmt: skip
 
         share(write, len(parts))

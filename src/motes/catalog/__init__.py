@@ -36,7 +36,7 @@ __all__ = [
     "quantity",
 ]
 
-KINDS = ("emit", "force", "flow", "solid", "retire", "look", "integrate")
+KINDS = ("emit", "force", "flow", "interact", "solid", "retire", "look")
 """Folders that hold components, in the order of a time step."""
 
 

@@ -34,6 +34,11 @@ class Motion:
         return bool(self.forces) or not self.flows
 
     @property
+    def relaxes(self) -> bool:
+        """Whether any force is a relaxation."""
+        return any(c.kernel("relaxation") for _, c in self.forces)
+
+    @property
     def mortal(self) -> bool:
         """Whether anything retires particles."""
         return bool(self.retire)
@@ -58,6 +63,13 @@ def write_motion(text: Text, motion: Motion) -> None:
         writer.splitting(motion.method)
     if motion.mortal:
         writer.dies()
+
+
+def write_potential(text: Text, motion: Motion) -> None:
+    """Write `potential(x, ..., age, C, S, L, t)` [m2/s2], the sum of all forces that have one."""
+    writer = _Writer(text, motion)
+    writer.right_hand_side()  # Registers the system's columns in the order in which it keeps them.
+    writer.potential()
 
 
 def stage_times(method: Method) -> tuple[float, ...]:
@@ -210,7 +222,7 @@ class _Writer:
         call = f"({', '.join(STATE)}, age + F({begin!r}) * h, C, S{i}, L, t{i})"
         lines = f"    ax, ay, az, r, bx, by, bz = pushed{call}\n"
         lines += f"    g = F({share!r}) * h\n"
-        if any(c.kernel("relaxation") for _, c in self.motion.forces):
+        if self.motion.relaxes:
             lines += "    g *= phi1(r * g)\n"
         return lines + "".join(
             f"    v{axis} += g * (a{axis} + b{axis} - r * v{axis})\n" for axis in AXES
@@ -236,6 +248,15 @@ class _Writer:
         self.text.add(
             f"@inline\ndef advance({', '.join(STATE)}, age, C, {scene}, L, {times}, h):\n"
             f"{lines}    return {', '.join(ends)}\n"
+        )
+
+    def potential(self) -> None:
+        """`potential`: potential energy of a unit mass in all forces that have a potential."""
+        having = [(a, c) for a, c in self.motion.forces if c.kernel("potential")]
+        calls = [self._call(address, c, "potential").source for address, c in having]
+        self.text.add(
+            f"@inline\ndef potential({', '.join(STATE)}, age, C, S, L, t):\n{self._preamble()}"
+            f"    return {' + '.join(calls) or 'F(0.0)'}\n"
         )
 
     def dies(self) -> None:

@@ -6,7 +6,7 @@ takes it through its impacts.
 
 from __future__ import annotations
 
-from motes.compile.motion import Motion, stage_times
+from motes.compile.motion import Motion, stage_times, write_potential
 from motes.compile.surfaces import Surfaces
 from motes.compile.text import AXES, STATE, Text
 from motes.compile.threat import END
@@ -82,3 +82,16 @@ def _write_step(
 def _block(name: str) -> str:
     axis = "xyz".index(name[-1])
     return f"velocity[{axis}]" if name.startswith("v") else f"position[{axis}]"
+
+
+def write_potentials(text: Text, motion: Motion) -> None:
+    """Write the kernel `potentials`: the forces' potential [m2/s2] at every row."""
+    write_potential(text, motion)
+    loop = _Loop(text, motion)
+    text.add(
+        "@kernel\ndef potentials(position, velocity, birth, columns, K, t, out, lo, hi):\n"
+        f"{loop.slices}    phi, S, now = out[lo:hi], scene(K, t), F(t)\n"
+        "    for i in range(x.size):\n"
+        f"        age, C = F(t - born[i]), {loop.columns}\n"
+        f"        phi[i] = potential({loop.row}, age, C, S, L, now)\n"
+    )

@@ -18,7 +18,8 @@ from motes.catalog import Component
 from motes.compile.births import Channels, births_kernel, write_draws, write_emitter
 from motes.compile.impacts import currents_kernel, exceptions_kernel, write_flight
 from motes.compile.motion import KEPT, Motion, write_motion
-from motes.compile.straight import write_straight
+from motes.compile.staged import write_staged
+from motes.compile.straight import write_potentials, write_straight
 from motes.compile.surfaces import Surfaces, write_surfaces
 from motes.compile.text import Text
 from motes.compile.threat import write_threat
@@ -101,6 +102,23 @@ class CompiledSystem:
         return self._fast_module["retire"]
 
     @cached_property
+    def _staged_module(self) -> tuple[dict[str, Any], Any]:
+        text = Text(self.fast.precision, self._strict)
+        write_motion(text, self.motion)
+        write_staged(text, self.motion)
+        text.add(text.values.scene_text())
+        return text.module(), text.values.arrays(text.real)
+
+    def staged(self, name: str) -> Any:
+        """Kernel `slope`, `kick` or `drift`, for systems that are part of a group."""
+        return self._staged_module[0][name]
+
+    @property
+    def K_staged(self) -> Any:
+        """What the staged kernels read."""
+        return self._staged_module[1]
+
+    @cached_property
     def _exact_module(self) -> dict[str, Any]:
         return self.exact.module()
 
@@ -110,6 +128,19 @@ class CompiledSystem:
         return exceptions_kernel(
             self._exact_module, self.solid.module(), self.motion, self.surfaces
         )
+
+    def potential(self, particles: Particles, time: float) -> NDArray[np.float64]:
+        """Potential (n,) [m2/s2] of the forces that have one, at each particle."""
+        result = np.zeros(particles.count)
+        if any(force.kernel("potential") for _, force in self.motion.forces):
+            text = Text("double", self._strict)
+            write_potentials(text, self.motion)
+            text.add(text.values.scene_text())
+            text.module()["potentials"](
+                particles.position, particles.velocity, particles.birth, particles.columns,
+                text.values.arrays(np.float64), time, result, 0, particles.count,
+            )  # fmt: skip
+        return result
 
     def carried(self, particles: Particles, time: float) -> NDArray[np.float64]:
         """Velocity (n, 3) [m/s] that the flows give to particles that have none of their own."""

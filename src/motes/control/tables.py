@@ -48,4 +48,16 @@ def _burst(entry: Any, name: str) -> dict[str, float]:
     return burst
 
 
-TABLES: dict[str, Callable[[Any, str], Any]] = {"bursts": bursts}
+def names(value: Any, name: str) -> list[str]:
+    """A list of names of systems.
+
+    Raises ValueError with one line.
+    """
+    if not isinstance(value, list) or not all(isinstance(n, str) and n for n in value):
+        raise ValueError(f'{name} must be a list of names, such as ["stars", "dust"].')
+    if len(set(value)) < len(value):
+        raise ValueError(f"{name} must name each system once.")
+    return value
+
+
+TABLES: dict[str, Callable[[Any, str], Any]] = {"bursts": bursts, "names": names}

@@ -22,6 +22,7 @@ from motes.scene.sections import Camera, Film, Sky
 Emitters = tuple[Annotated[Component, Entry("emit")], ...]
 Forces = tuple[Annotated[Component, Entry("force")], ...]
 Flows = tuple[Annotated[Component, Entry("flow")], ...]
+Interactions = tuple[Annotated[Component, Entry("interact")], ...]
 Solids = tuple[Annotated[Component, Entry("solid")], ...]
 Retirements = tuple[Annotated[Component, Entry("retire")], ...]
 Look = Annotated[Component, Entry("look")]
@@ -133,7 +134,7 @@ class Scene(Section):
     """A whole scene: everything that a simulation and a film of it follow from."""
 
     noun: ClassVar[str] = "scene"
-    lists: ClassVar[tuple[str, ...]] = ("force", "flow", "solid")
+    lists: ClassVar[tuple[str, ...]] = ("force", "flow", "interact", "solid")
 
     title: str = quantity("", shape="text")
     """A short name for people."""
@@ -176,6 +177,9 @@ class Scene(Section):
 
     flow: Flows = ()
     """Flows that carry every system."""
+
+    interact: Interactions = ()
+    """Laws between particles, of one system or of several."""
 
     solid: Solids = ()
     """Shapes that bounce particles, hide what is behind them, and are drawn."""

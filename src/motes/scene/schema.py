@@ -45,7 +45,7 @@ def schema() -> Schema:
     for shape in _PLAIN:
         definitions |= _forms(shape)
     for kind in KINDS:
-        definitions |= _kind(kind) if kind != "integrate" else {}
+        definitions |= _kind(kind)
     for name, model in (("film", Film), ("camera", Camera), ("sky", Sky)):
         definitions[name] = _section(model)
     definitions["system"] = _section(
@@ -195,6 +195,11 @@ _TABLES: dict[str, Schema] = {
             {key: {"type": "number", "minimum": 0, "maximum": most} for key, most in MOST.items()},
             ("count",),
         ),
-    }
+    },
+    "names": {
+        "type": "array",
+        "items": {"type": "string", "minLength": 1},
+        "uniqueItems": True,
+    },
 }
-"""Values that are lists of small tables, as `motes.control.tables` reads them."""
+"""Values that are lists of small tables or of names, as `motes.control.tables` reads them."""

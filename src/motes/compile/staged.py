@@ -1,0 +1,75 @@
+"""The staged form of a system's motion: one stage of a method for all rows, before the next stage.
+
+Systems that feel each other cannot go through a step particle by particle. Their kernels evaluate
+the right-hand side of every row at one stage, with what the interactions add (`push`) as arrays.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from motes.compile.motion import Motion
+from motes.compile.text import AXES, STATE, Text
+from motes.jit import jit
+from motes.tableau import Splitting
+
+
+def write_staged(text: Text, motion: Motion) -> None:
+    """Write `slope` (for Runge-Kutta methods) or `kick` and `drift` (for splittings)."""
+    columns = sum(c.width for c in text.values.columns)
+    names = [f"c{i}" for i in range(columns)]
+    carried = "(" + "".join(f"{n}[i], " for n in names) + ("" if names else "F(0.0),") + ")"
+    slices = "".join(f"    {n} = Y[{k}][lo:hi]\n" for k, n in enumerate(STATE))
+    slices += "".join(f"    {n} = columns[{i}][lo:hi]\n" for i, n in enumerate(names))
+    slices += "".join(f"    g{a} = push[{k}][lo:hi]\n" for k, a in enumerate(AXES))
+    slices += "    born = birth[lo:hi]\n    constants, offsets, splines, L = K\n"
+    slices += "    S, now = scene(K, t), F(t)\n"
+    row = ", ".join(f"{n}[i]" for n in STATE)
+    begin = f"    for i in range(x.size):\n        age, C = F(t - born[i]), {carried}\n"
+    call = f"({row}, age, C, S, L, now)"
+    pushed = f"        ax, ay, az, r, bx, by, bz = pushed{call}\n"
+    flows = f"        ux, uy, uz = carried{call}\n" if motion.flows else ""
+    if isinstance(motion.method, Splitting):
+        change = "        g = phi1(r * h) * h\n" if motion.relaxes else "        g = h\n"
+        change += "".join(
+            f"        v{a}[i] += g * (a{a} + b{a} + g{a}[i] - r * v{a}[i])\n" for a in AXES
+        )
+        head = "(Y, birth, columns, push, K, t, dt, lo, hi):\n    h = F(dt)\n"
+        text.add(f"@kernel\ndef kick{head}{slices}{begin}{pushed}{change}")
+        text.add(f"@kernel\ndef drift{head}{slices}{begin}{_drift(motion, flows, row)}")
+        return
+    outputs = "".join(f"    k{n} = slope_[{k}][lo:hi]\n" for k, n in enumerate(STATE))
+    change = "".join(
+        f"        k{a}[i] = v{a}[i]{f' + u{a}' if flows else ''}\n"
+        f"        kv{a}[i] = a{a} + b{a} + g{a}[i] - r * v{a}[i]\n"
+        for a in AXES
+    )
+    head = "@kernel\ndef slope(Y, birth, columns, push, slope_, K, t, lo, hi):\n"
+    text.add(head + slices + outputs + begin + flows + pushed + change)
+
+
+def _drift(motion: Motion, flows: str, row: str) -> str:
+    """Source that moves a row with its velocity and, by the midpoint rule, with the flows."""
+    if not motion.flows:
+        return "".join(f"        {a}[i] += h * v{a}[i]\n" for a in AXES)
+    middle = "".join(f"        m{a} = {a}[i] + F(0.5) * h * (v{a}[i] + u{a})\n" for a in AXES)
+    velocity = row.split(", ", 3)[3]
+    later = "age + F(0.5) * h, C, scene(K, t + 0.5 * dt), L, F(t + 0.5 * dt)"
+    again = f"        ux, uy, uz = carried(mx, my, mz, {velocity}, {later})\n"
+    moved = "".join(f"        {a}[i] += h * (v{a}[i] + u{a})\n" for a in AXES)
+    return flows + middle + again + moved
+
+
+@jit
+def combine(base: Any, slopes: Any, weights: Any, h: Any, out: Any, lo: Any, hi: Any) -> None:
+    """out = base + h sum_j weights_j slopes_j, for rows lo to hi of blocks (6, n)."""
+    for k in range(6):
+        target, source = out[k][lo:hi], base[k][lo:hi]
+        for i in range(target.size):
+            target[i] = source[i]
+        for j in range(weights.size):
+            share = h * weights[j]
+            if share != 0.0:
+                slope = slopes[j, k][lo:hi]
+                for i in range(target.size):
+                    target[i] += share * slope[i]

@@ -1,0 +1,74 @@
+"""Energy, momentum and what else a closed system keeps: to judge a simulation by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class Matter(NamedTuple):
+    """Particles of one system: `position` and `velocity` (3, n) [m, m/s], `mass` (n,) [kg]."""
+
+    position: NDArray[Any]
+    velocity: NDArray[Any]
+    mass: NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Sums over all particles at one instant, in double precision."""
+
+    time: float
+    """Scene time [s]."""
+
+    mass: float
+    """sum m [kg]."""
+
+    kinetic: float
+    """sum m v^2 / 2 [J]."""
+
+    potential: float
+    """Potential energy [J] of interactions, and of the forces that have a potential."""
+
+    momentum: Floats
+    """sum m v (3,) [kg m/s]."""
+
+    angular_momentum: Floats
+    """sum m x cross v (3,) [kg m2/s], about the origin."""
+
+    center: Floats
+    """Center of mass sum m x / sum m (3,) [m]."""
+
+    @property
+    def energy(self) -> float:
+        """Kinetic and potential energy [J]."""
+        return self.kinetic + self.potential
+
+    @property
+    def virial_ratio(self) -> float:
+        """2 T / |U|, which is 1 for a self-gravitating system in equilibrium; NaN without U.
+
+        Source: Clausius, Annalen der Physik 217 (1870) 124.
+        """
+        return 2.0 * self.kinetic / abs(self.potential) if self.potential else float("nan")
+
+
+def measure(time: float, systems: Iterable[Matter], potential: float) -> Measures:
+    """Sum up systems; `potential` [J] is the potential energy of them all."""
+    mass = kinetic = 0.0
+    momentum, angular, weighted = np.zeros(3), np.zeros(3), np.zeros(3)
+    for matter in systems:
+        x, v, m = (np.asarray(part, float) for part in matter)
+        mass += m.sum()
+        kinetic += 0.5 * (m * (v**2).sum(axis=0)).sum()
+        momentum += v @ m
+        angular += np.cross(x, v, axis=0) @ m
+        weighted += x @ m
+    center = weighted / mass if mass else weighted
+    return Measures(time, float(mass), float(kinetic), potential, momentum, angular, center)
