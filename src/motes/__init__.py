@@ -10,7 +10,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from motes import emit, flow, force, interact, look, retire, solid
+    from motes import emit, flow, force, gravity, interact, look, neighbours, ode, retire, solid
     from motes.catalog import (
         Color,
         Flag,
@@ -61,9 +61,12 @@ __all__ = [
     "film",
     "flow",
     "force",
+    "gravity",
     "interact",
     "load",
     "look",
+    "neighbours",
+    "ode",
     "quantity",
     "redraw",
     "render",

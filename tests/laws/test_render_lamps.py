@@ -86,3 +86,17 @@ def test_lamps_do_not_depend_on_threads():
     motes.jit.threads(0)
     assert np.array_equal(images[0], images[1])
     assert np.array_equal(images[0], images[2])
+
+
+def test_a_lone_particle_does_not_blind_itself() -> None:
+    """At its own place its light is at most half of g / r^2 = L / 4, with r its radius."""
+    alone = Layer(
+        position=np.zeros((1, 3), np.float32),
+        velocity=np.zeros((1, 3), np.float32),
+        color=np.ones((1, 4), np.float32),
+        size=np.array([0.01], np.float32),
+        emission=3.0,
+        opacity=0.5,
+    )
+    light = scattered(alone.position, gather([alone], 0.0))
+    assert light == pytest.approx(np.full((1, 3), 3.0 / 8), rel=1e-4)

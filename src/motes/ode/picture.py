@@ -137,7 +137,8 @@ def _paths(axes: Axes, of: Problem, exact: Array, runs: dict[str, Run], paint: A
 
 def _field(axes: Axes, of: Problem) -> None:
     """The slopes as arrows of equal length."""
-    x, y = np.meshgrid(np.linspace(*axes.get_xlim(), 17), np.linspace(*axes.get_ylim(), 17))
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    x, y = np.meshgrid(np.linspace(left, right, 17), np.linspace(low, high, 17))
     i, j = of.axes[0]
     u, v = np.empty_like(x), np.empty_like(x)
     for place in np.ndindex(x.shape):

@@ -50,6 +50,7 @@ def _of(layer: Layer) -> list[NDArray[np.float64]]:
     weight = strength.sum(axis=1)
     shines = np.isfinite(weight) & np.isfinite(layer.position).all(axis=1) & (weight > 0)
     strength, weight, position = strength[shines], weight[shines], layer.position[shines]
+    radius2 = layer.size[shines].astype(float) ** 2 / 4
     if not len(weight):
         return []
     octant = (position > np.average(position, axis=0, weights=weight)) @ np.array([1, 2, 4])
@@ -58,7 +59,8 @@ def _of(layer: Layer) -> list[NDArray[np.float64]]:
         rows = octant == part
         if rows.any():
             center = np.average(position[rows], axis=0, weights=weight[rows])
-            squares = ((position[rows] - center) ** 2).sum(axis=1)
+            # No lamp is smaller than its particles, or one alone would blind itself.
+            squares = ((position[rows] - center) ** 2).sum(axis=1) + radius2[rows]
             spread = np.average(squares, weights=weight[rows])
             lamps.append(np.concatenate([center, [spread], strength[rows].sum(axis=0)]))
     return lamps
