@@ -9,6 +9,7 @@ phi_i = -G sum_j m_j / r, r = |x_j - x_i|, weakened at short range by a softenin
 place do not pull each other, and no particle counts itself.
 """
 
+# mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
 import math
@@ -22,6 +23,7 @@ from motes.interact.gravity.direct import direct
 from motes.interact.gravity.multipole import multipole
 from motes.interact.gravity.softening import SUPPORT, center_depth
 from motes.interact.gravity.tree import Box
+from motes.jit import blocks, jit, share
 
 __all__ = ["acceleration", "field", "potential"]
 
@@ -252,12 +254,30 @@ def _tolerance(tolerance: float | None, method: str, dtype: np.dtype[Any]) -> fl
 
 def _cube(*clouds: NDArray[Any]) -> tuple[NDArray[np.float64], float]:
     """Lowest corner and edge of the cube around points."""
-    columns = [c.T.astype(np.float64, order="C") for c in clouds if len(c)]
-    if not columns:
+    found: NDArray[np.float64] = np.concatenate([_corners(cloud) for cloud in clouds])
+    if not len(found):
         return np.zeros(3), 0.0
-    low = np.min([c.min(axis=1) for c in columns], axis=0)
-    high = np.max([c.max(axis=1) for c in columns], axis=0)
+    low, high = found[:, :, 0].min(axis=0), found[:, :, 1].max(axis=0)
     return low, float((high - low).max())
+
+
+def _corners(cloud: NDArray[Any]) -> NDArray[np.float64]:
+    """Smallest and largest coordinates of each block of rows, (blocks, 3, 2)."""
+    ranges = blocks(len(cloud), 1 << 16)
+    found = np.empty((len(ranges), 3, 2))
+    share(lambda k: _measure(cloud, *ranges[k], found[k]), len(ranges))
+    return found
+
+
+@jit
+def _measure(cloud: Any, first: Any, last: Any, corners: Any) -> None:
+    """Smallest and largest coordinates of rows `first` to `last`."""
+    for axis in range(3):
+        low, high = np.inf, -np.inf
+        for i in range(first, last):
+            value = np.float64(cloud[i, axis])
+            low, high = min(low, value), max(high, value)
+        corners[axis, 0], corners[axis, 1] = low, high
 
 
 def _power_of_two(value: float) -> float:

@@ -26,6 +26,7 @@ from motes.interact.gravity.tree import (
     largest_leaf,
     octree,
     summarize,
+    unpermute,
 )
 from motes.interact.gravity.walk import walker
 from motes.jit import blocks, share, threads
@@ -36,10 +37,10 @@ SINGLE_FROM = 4e-6
 LEAVES = 64
 """Target leaves on which the error is measured before all are computed."""
 
-SAFETY = 0.6
+SAFETY = 0.7
 """Part of the tolerance that the error on the sample may use."""
 
-FIRST = 12.0
+FIRST = 24.0
 """First trial of what one expansion may neglect, in units of the tolerance."""
 
 TRIALS = 8
@@ -170,12 +171,7 @@ class Problem:
         result = np.empty(sums.shape)
         order, ranges = self.targets.order, blocks(sums.shape[1], 1 << 16)
 
-        def scatter(number: int) -> None:
-            low, high = ranges[number]
-            for row in range(len(sums)):
-                result[row, order[low:high]] = sums[row, low:high]
-
-        share(scatter, len(ranges))
+        share(lambda k: unpermute(sums, order, result, *ranges[k]), len(ranges))
         return result
 
     def _walk(self, ranges: list[tuple[int, int]], limits: Limits) -> NDArray[Any]:

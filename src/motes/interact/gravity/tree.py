@@ -104,6 +104,14 @@ def _permute(
 
 
 @jit
+def unpermute(sums: Any, order: Any, result: Any, first: Any, last: Any) -> None:
+    """Write columns `first` to `last` of sums in the tree's order to where they came from."""
+    for row in range(sums.shape[0]):
+        for i in range(first, last):
+            result[row, order[i]] = sums[row, i]
+
+
+@jit
 def _summarize(
     tree: Tree, first: Any, last: Any, table: Tables, bench: Bench, shifted: Any, relative: bool
 ) -> None:
