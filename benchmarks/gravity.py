@@ -1,0 +1,174 @@
+"""Gravity of n bodies, beside peers in the same run: python benchmarks/gravity.py [--json].
+
+Equal masses of a Plummer sphere, unsoftened. Errors are rms |a - a_direct| / rms |a| on 300
+particles, with direct sums in double precision. Each peer, where it is installed, runs at some of
+its own settings, and `gravity.acceleration` at a tolerance equal to the error that the peer was
+measured to have, so that a ratio of times never compares us with something more exact. Peers use as
+many threads as we do.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import tracemalloc
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from _report import Report, arguments, best, machine
+
+import motes.jit
+from motes import gravity
+from motes.interact.gravity.pairs import attraction
+
+SAMPLE = 300
+
+Accelerations = Callable[[], np.ndarray]
+
+
+def plummer_sphere(n: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(0)
+    r = 1 / np.sqrt(rng.random(n) ** (-2 / 3) - 1)
+    way = rng.normal(size=(n, 3))
+    return r[:, None] * way / np.linalg.norm(way, axis=1)[:, None], np.full(n, 1 / n)
+
+
+class Cloud:
+    """A Plummer sphere that knows the error of accelerations."""
+
+    def __init__(self, n: int) -> None:
+        self.n = n
+        self.x, self.m = plummer_sphere(n)
+        self.rows = np.random.default_rng(1).choice(n, SAMPLE, replace=False)
+        self.exact = gravity.acceleration(self.x, self.m, targets=self.x[self.rows])
+
+    def error(self, a: np.ndarray) -> float:
+        return float(np.sqrt(((a[self.rows] - self.exact) ** 2).sum() / (self.exact**2).sum()))
+
+    def ours(self, tolerance: float) -> Accelerations:
+        return lambda: gravity.acceleration(self.x, self.m, tolerance=tolerance, method="multipole")
+
+
+def inner_loop() -> float:
+    """Pairs per second [G/s] of the innermost loop, in single precision, on data in the cache."""
+    rng = np.random.default_rng(0)
+    attract = attraction("newton", np.float32, False)
+    target, source = (rng.random((rows, 1024), np.float32) for rows in (3, 4))
+    total, size = np.zeros((5, 1024), np.float32), np.float32(0)
+    columns = [source[row] for row in (0, 1, 2, 3, 3)]
+    return 1024**2 / best(lambda: attract(target, 1024, *columns, size, size, total), 50) / 1e9
+
+
+def direct(report: Report, n: int) -> None:
+    x, m = plummer_sphere(n)
+    every = motes.jit.threads()
+    for real, name in ((np.float32, "single"), (np.float64, "double")):
+        points = x.astype(real)
+        for count in sorted({1, every}):
+            motes.jit.threads(count)
+            seconds = best(lambda p=points: gravity.acceleration(p, m), 3)
+            label = f"direct, {name}, {count} thread{'s' * (count > 1)}"
+            report.figures[label] = (n * n / seconds / 1e9, "G pairs/s")
+    motes.jit.threads(every)
+    report.figures["its inner loop in the cache"] = (inner_loop(), "G pairs/s")
+    report.ratio("direct, single, 1 thread", "its inner loop in the cache")
+
+
+def multipole(report: Report, sizes: list[int]) -> None:
+    for n in sizes:
+        cloud = Cloud(n)
+        for tolerance in (1e-3, 1e-5):
+            task = cloud.ours(tolerance)
+            error, seconds = cloud.error(task()), best(task, 3)
+            label = f"n = {n:.0e}, tolerance {tolerance:.0e}"
+            report.figures[label] = (seconds, "s")
+            report.figures[f"{label}, a particle"] = (seconds / n * 1e6, "us")
+            report.figures[f"{label}, error"] = (error, "")
+
+
+def memory(report: Report, n: int) -> None:
+    task = Cloud(n).ours(1e-3)
+    task()
+    tracemalloc.start()
+    task()
+    report.figures["most memory beyond x and m"] = (tracemalloc.get_traced_memory()[1] / n, "B")
+    tracemalloc.stop()
+
+
+def pytreegrav_tasks(cloud: Cloud) -> Iterator[tuple[str, Accelerations]]:
+    try:
+        import numba
+        import pytreegrav
+    except ImportError:
+        return
+    numba.set_num_threads(motes.jit.threads())
+    for theta, quadrupole in ((0.7, False), (0.7, True), (0.4, True)):
+        name = f"pytreegrav, theta {theta}, {'quadrupole' if quadrupole else 'monopole'}"
+        yield (
+            name,
+            lambda t=theta, q=quadrupole: pytreegrav.Accel(
+                cloud.x, cloud.m, theta=t, quadrupole=q, parallel=True, method="tree"
+            ),
+        )
+
+
+def fmm3dpy_tasks(cloud: Cloud) -> Iterator[tuple[str, Accelerations]]:
+    try:
+        import fmm3dpy
+    except ImportError:
+        return
+    points = np.asfortranarray(cloud.x.T)
+
+    def gradient(eps: float) -> np.ndarray:
+        # Its potential is q / (4 pi r).
+        found = fmm3dpy.lfmm3d(eps=eps, sources=points, charges=cloud.m, pg=2)
+        return 4 * np.pi * np.asarray(found.grad).T
+
+    for eps in (1e-3, 1e-4, 1e-6):
+        yield f"fmm3dpy, eps {eps:.0e}", lambda e=eps: gradient(e)
+
+
+def peers(report: Report, n: int) -> None:
+    cloud = Cloud(n)
+    for tasks in (pytreegrav_tasks, fmm3dpy_tasks):
+        for name, task in tasks(cloud):
+            error = cloud.error(task())
+            report.figures[name] = (best(task, 2), "s")
+            report.figures[f"{name}, error"] = (error, "")
+            if 1e-10 <= error < 1:
+                ours = f"motes, as exact as {name}"
+                report.figures[ours] = (best(cloud.ours(error), 3), "s")
+                report.ratio(name, ours)
+
+
+def first_call() -> float:
+    """Seconds of a first call in a new process with an empty kernel cache, without imports."""
+    program = (
+        "import numpy, time; from motes import gravity; x = numpy.random.rand(20000, 3);"
+        "t = time.time(); gravity.acceleration(x, x[:, 0], tolerance=1e-3, method='multipole');"
+        "print(time.time() - t)"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        environment = os.environ | {"MOTES_CACHE": folder}
+        run = [sys.executable, "-c", program]
+        return float(subprocess.run(run, env=environment, check=True, capture_output=True).stdout)
+
+
+def main() -> None:
+    options = arguments(__doc__).parse_args()
+    report = Report("Gravity", machine=machine(("pytreegrav", "fmm3dpy")))
+    begun = time.perf_counter()
+    direct(report, 20_000 if options.quick else 65_536)
+    multipole(report, [100_000] if options.quick else [100_000, 1_000_000, 10_000_000])
+    memory(report, 100_000 if options.quick else 1_000_000)
+    peers(report, 20_000 if options.quick else 100_000)
+    report.figures["first call, empty kernel cache"] = (first_call(), "s")
+    report.notes.append(f"measured in {time.perf_counter() - begun:.0f} s")
+    report.print(options.json)
+
+
+if __name__ == "__main__":
+    main()
