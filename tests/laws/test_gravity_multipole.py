@@ -60,7 +60,7 @@ def test_the_error_is_below_the_tolerance(name, tolerance):
     assert np.abs(total).max() < tolerance * (m[:, None] * np.abs(a)).sum()
 
 
-@pytest.mark.parametrize("name", ["uniform", "plummer", "disc"])
+@pytest.mark.parametrize("name", ["uniform", "plummer", "two clusters", "disc"])
 @pytest.mark.parametrize("kernel", ["spline", "plummer"])
 @pytest.mark.parametrize("softening", [0.01, 0.5])
 def test_softened_sums_agree(name, kernel, softening):

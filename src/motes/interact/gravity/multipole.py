@@ -18,6 +18,7 @@ from motes.interact.gravity.desk import Desk, Limits, desk
 from motes.interact.gravity.expansions import Tables, tables
 from motes.interact.gravity.tree import (
     END,
+    RADIUS,
     SKIP,
     START,
     Box,
@@ -34,19 +35,22 @@ from motes.jit import blocks, share, threads
 SINGLE_FROM = 4e-6
 """Smallest tolerance that single precision keeps."""
 
-LEAVES = 64
-"""Target leaves on which the error is measured before all are computed."""
+LEAVES = 32
+"""Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
-SAFETY = 0.7
+LEAVES_OF_A_CLASS = 8
+"""Target leaves out of each further class, which has twice as many as the one before."""
+
+SAFETY = 0.55
 """Part of the tolerance that the error on the sample may use."""
 
-FIRST = 24.0
+FIRST = 8.0
 """First trial of what one expansion may neglect, in units of the tolerance."""
 
 TRIALS = 8
 """Trials before all is summed by pairs."""
 
-STRICTER = 30.0
+STRICTER = 5.0
 """How much less the walk that the sample is compared with may neglect."""
 
 
@@ -60,7 +64,7 @@ class Plan:
     """Most particles in a leaf."""
     real: type
     """Precision of expansions and pairs; places are always in double."""
-    opening: float = 0.95
+    opening: float = 0.9
     """Largest (r_A + r_B) / R at which expansions are used, whatever their estimate."""
 
 
@@ -140,25 +144,29 @@ class Problem:
     def limits_for(self, tolerance: float) -> Limits:
         """Limits of the walk that keep SAFETY times the tolerance on a sample of leaves.
 
-        The error is measured against a walk that neglects much less, and found to be proportional
-        to what one expansion may neglect. A few leaves cost next to nothing, whatever n.
+        The error is measured against a walk that neglects much less; it falls at most in proportion
+        to what one expansion may neglect. A few leaves cost little, whatever n.
         """
-        rows, ranges = self._sample()
-        a = _lengths(self._at(rows, ranges, self.limits(math.inf, math.inf, math.inf)))
-        n = self.targets.place.shape[1]
-        scale = _typical(a)
-        pulled = a * self.targets.place[3, rows]
-        force = n / len(a) * float(_smaller(pulled[pulled > 0]).sum()) or math.inf
+        sample = self._sample()
+        a = _lengths(self._at(sample, self.limits(math.inf, math.inf, math.inf)))
+        scale = sample.typical(a)
+        pulled = a * self.targets.place[3, sample.rows]
+        force = sample.mean_of_most(pulled) * self.targets.place.shape[1] or math.inf
         rounding = 0.2 * tolerance * scale
         share = FIRST * tolerance
         for _ in range(TRIALS):
             limits = self.limits(share * scale, share * force, rounding)
-            strict = self.limits(*(v / STRICTER for v in (share * scale, share * force, rounding)))
-            found = self._error(self._at(rows, ranges, limits), self._at(rows, ranges, strict))
+            strict = limits._replace(
+                opening2=limits.opening2 / 2,
+                error=limits.error / STRICTER,
+                force=limits.force / STRICTER,
+                rounding=limits.rounding / STRICTER,
+            )
+            found = self._error(sample, self._at(sample, limits), self._at(sample, strict))
             if found <= SAFETY * tolerance:
                 return limits
-            share *= max(0.8 * SAFETY * tolerance / found, 0.05)
-        return self.limits(0.0, 0.0, 0.0)
+            share *= min(max(0.8 * SAFETY * tolerance / found, 0.05), 0.5)
+        return self.limits(0.0, 0.0, rounding)
 
     def solve(self, limits: Limits) -> NDArray[Any]:
         """Sums (4, k) at all targets, in the order of the tree."""
@@ -194,45 +202,76 @@ class Problem:
         share(task, len(ranges))
         return out
 
-    def _sample(self) -> tuple[NDArray[np.intp], list[tuple[int, int]]]:
-        """Leaves spread evenly over the particles: their rows, and their ranges of rows."""
+    def _sample(self) -> Sample:
+        """Leaves in classes by radius, as the largest errors are those of few large leaves."""
         cells = self.targets.cells
-        leaves = cells[cells[:, SKIP] == np.arange(1, len(cells) + 1)]
-        n = self.targets.place.shape[1]
-        chosen = (np.arange(LEAVES) + 0.5) * n / LEAVES
-        numbers = np.unique(np.searchsorted(leaves[:, START], chosen, "right") - 1)
-        ranges = [(int(start), int(end)) for start, end, _ in leaves[numbers]]
-        return np.concatenate([np.arange(*r) for r in ranges]), ranges
+        leaves = np.flatnonzero(cells[:, SKIP] == np.arange(1, len(cells) + 1))
+        leaves = leaves[np.argsort(-self.targets.bodies[leaves, RADIUS], kind="stable")]
+        counts = cells[leaves, END] - cells[leaves, START]
+        chosen, weights, first, last = [np.arange(0)], [np.ones(0)], 0, LEAVES
+        while first < len(leaves):
+            last = min(last, len(leaves))
+            number = min(LEAVES_OF_A_CLASS if first else LEAVES, last - first)
+            some = first + (np.arange(number) * 2 + 1) * (last - first) // (2 * number)
+            chosen.append(some)
+            weights.append(np.full(number, counts[first:last].sum() / counts[some].sum()))
+            first, last = last, 2 * last
+        picked = np.concatenate(chosen)
+        ranges = [(int(start), int(end)) for start, end, _ in cells[leaves[picked]]]
+        rows = np.concatenate([np.arange(*r) for r in ranges])
+        return Sample(ranges, rows, np.repeat(np.concatenate(weights), counts[picked]))
 
-    def _at(
-        self, rows: NDArray[np.intp], ranges: list[tuple[int, int]], limits: Limits
-    ) -> NDArray[np.float64]:
-        return self._walk(ranges, limits)[:, rows].astype(np.float64)
+    def _at(self, sample: Sample, limits: Limits) -> NDArray[np.float64]:
+        return self._walk(sample.ranges, limits)[:, sample.rows].astype(np.float64)
 
-    def _error(self, tried: NDArray[np.float64], exact: NDArray[np.float64]) -> float:
+    def _error(
+        self, sample: Sample, tried: NDArray[np.float64], exact: NDArray[np.float64]
+    ) -> float:
         parts = [(_lengths(tried - exact), _lengths(exact))]
         if self.potential:
             parts.append((tried[3] - exact[3], np.abs(exact[3])))
-        return max(_rms(wrong) / (_typical(values) or math.inf) for wrong, values in parts)
+        rounding = 8 * float(np.finfo(self.plan.real).eps)
+        return max(sample.relative(wrong, values, rounding) for wrong, values in parts)
 
 
-def _smaller(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """All but the largest sixteenth.
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Some targets that stand for all."""
 
-    Close pairs and large masses may dominate means of few targets by chance, which would allow too
-    large errors.
-    """
-    return np.sort(values)[: len(values) - len(values) // 16]
+    ranges: list[tuple[int, int]]
+    """Rows in the order of the tree, whole leaves."""
+    rows: NDArray[np.intp]
+    """The same one by one."""
+    weight: NDArray[np.float64]
+    """How many targets each row stands for."""
 
+    def mean_of_most(self, values: NDArray[np.float64]) -> float:
+        """Mean without the largest sixteenth of those that are not zero.
 
-def _typical(values: NDArray[np.float64]) -> float:
-    return _rms(_smaller(values))
+        Close pairs and large masses may dominate means of few targets by chance, which would allow
+        too large errors.
+        """
+        order = np.argsort(values)
+        order = order[values[order] > 0.0]
+        if not len(order):
+            return 0.0
+        share = np.cumsum(self.weight[order])
+        most = order[share <= max(share[-1] * 15 / 16, share[0])]
+        return float((self.weight[most] * values[most]).sum() / self.weight.sum())
+
+    def typical(self, values: NDArray[np.float64]) -> float:
+        """Root mean square of most values."""
+        return math.sqrt(self.mean_of_most(values**2))
+
+    def relative(
+        self, wrong: NDArray[np.float64], values: NDArray[np.float64], rounding: float
+    ) -> float:
+        """Rms error in units of what is typical, without the rounding of large values."""
+        more = np.maximum(np.abs(wrong) - rounding * values, 0.0)
+        rms = math.sqrt((self.weight * more**2).sum() / self.weight.sum())
+        return rms / (self.typical(values) or math.inf)
 
 
 def _lengths(sums: NDArray[np.float64]) -> NDArray[np.float64]:
     lengths: NDArray[np.float64] = np.sqrt((sums[:3] ** 2).sum(axis=0))
     return lengths
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return float(np.sqrt(np.mean(values**2)))

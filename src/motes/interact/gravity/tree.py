@@ -23,6 +23,16 @@ from motes.jit import blocks, jit, share
 START, END, SKIP = 0, 1, 2
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
 
+FEW = 8
+"""Most particles in leaves that are much larger than usual.
+
+Such a leaf has a side that is near to very many small cells, in all of which it would see particles
+only, and expansions around its center hardly converge at its edge.
+"""
+
+FINER = 3
+"""Levels from a usual leaf up to one that is much larger."""
+
 LIGHT = 1e-30
 """Weight of massless particles in a center, where the masses of all are about 1."""
 
@@ -49,8 +59,11 @@ class Tree(NamedTuple):
 
 
 @jit
-def _divide(key: Any, leaf: Any, cells: Any) -> Any:
-    """Write START and END of all cells; return their number, or 0 if there is no room."""
+def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
+    """Write the rows of all cells; return their number, or 0 if there is no room.
+
+    Leaves have at most `leaf` particles, or FEW if they fill a cube of a level under `coarse`.
+    """
     stack = np.empty((8 * LEVELS + 1, 3), np.int64)
     stack[0, 0], stack[0, 1], stack[0, 2] = 0, key.size, 0
     depth, count = 1, 0
@@ -61,13 +74,13 @@ def _divide(key: Any, leaf: Any, cells: Any) -> Any:
             return 0
         cells[count, START], cells[count, END] = start, end
         count += 1
-        if end - start <= leaf:
+        if end - start <= FEW:
             continue
         shift = np.uint64(3 * (LEVELS - 1 - level))
         while level < LEVELS and key[start] >> shift == key[end - 1] >> shift:
             level += 1
             shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
-        if level == LEVELS:
+        if level == LEVELS or (end - start <= leaf and level >= coarse):
             continue
         high = end
         while high > start:
@@ -184,6 +197,9 @@ def _summarize(
                 child = cells[child, SKIP]
                 lane += 1
             moments_to_moments(table, bench, tree.moments[cell])
+        if tree.moments.shape[0] > 0:
+            # Single precision would lose digits of the sum of many equal masses.
+            tree.moments[cell, 0] = mass
 
 
 @jit(inline=True)
@@ -205,17 +221,14 @@ class Box:
 
 
 def octree(points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int) -> Tree:
-    """Sort and divide particles (n, 3) with masses (n,) until no cell has more than `leaf`.
+    """Sort and divide particles (n, 3) with masses (n,) until no leaf has more than `leaf`.
 
     Particles that share a key, closer than 2^-21 of the box, stay in one leaf.
     """
     key, order = morton_order(points, box.low, box.size)
     n = len(key)
-    capacity, count = 64 + 4 * n // leaf, 0
-    while not count:
-        capacity *= 2
-        cells = np.empty((capacity, 3), np.int32)
-        count = _divide(key, leaf, cells)
+    cells = _cells(key, leaf, 0)
+    cells = _cells(key, leaf, _usual_level(key, cells) - FINER)
     place = np.empty((4, n))
     ranges = blocks(n, 1 << 16)
     share(
@@ -223,7 +236,26 @@ def octree(points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int)
         len(ranges),
     )
     nothing = np.empty((0, 0))
-    return Tree(cells[:count].copy(), np.empty((count, 5)), order, place, nothing, nothing)
+    return Tree(cells, np.empty((len(cells), 5)), order, place, nothing, nothing)
+
+
+def _cells(key: NDArray[np.uint64], leaf: int, coarse: int) -> NDArray[np.int32]:
+    capacity, count = 64 + 4 * len(key) // leaf, 0
+    while not count:
+        capacity *= 2
+        cells: NDArray[np.int32] = np.empty((capacity, 3), np.int32)
+        count = _divide(key, leaf, coarse, cells)
+    return cells[:count].copy()
+
+
+def _usual_level(key: NDArray[np.uint64], cells: NDArray[np.int32]) -> int:
+    """Level of the cube around the leaf of the median particle, leaves sorted by that."""
+    leaves = cells[cells[:, SKIP] == np.arange(1, len(cells) + 1)]
+    apart = key[leaves[:, START]] ^ key[leaves[:, END] - 1]
+    level = LEVELS - np.ceil(np.frexp(apart.astype(np.float64))[1] / 3)
+    order = np.argsort(level)
+    share = np.cumsum((leaves[:, END] - leaves[:, START])[order])
+    return int(level[order[np.searchsorted(share, share[-1] / 2)]])
 
 
 def summarize(tree: Tree, table: Tables, real: type, sources: bool) -> Tree:
