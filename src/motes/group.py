@@ -26,7 +26,7 @@ from motes.state import Particles
 from motes.step import Interval, Stepper
 from motes.tableau import Explicit, Splitting
 
-BLOCK = 1 << 16
+BLOCK = 1 << 14
 """Rows of one kernel call."""
 
 Interactions = tuple[tuple[str, Component], ...]
@@ -43,18 +43,17 @@ class Bodies:
 
 @dataclass
 class _Member:
-    """One system of the group during a step: state y (6, n), push (3, n) and mass (n,)."""
+    """One system of the group during a step: state y (6, capacity) and push (3, n)."""
 
     stepper: Stepper
     rows: Particles
     alive: int
-    y: NDArray[Any]
     push: NDArray[Any]
 
-    def store(self) -> None:
-        """Write the state back into the particles' columns."""
-        self.rows.position[:, : self.alive] = self.y[:3]
-        self.rows.velocity[:, : self.alive] = self.y[3:]
+    @property
+    def y(self) -> NDArray[Any]:
+        """Positions and velocities, the particles' own."""
+        return self.rows.motion
 
     def each(self, name: str, *arguments: Any) -> None:
         """Run one of the system's staged kernels over all rows that were alive."""
@@ -64,7 +63,8 @@ class _Member:
 
     def body(self, time: float) -> Body:
         """The system as laws of limited reach see it."""
-        return Body(self.stepper, self.rows, self.alive, self.y[:3], self.y[3:], time)
+        x, v = self.rows.position[:, : self.alive], self.rows.velocity[:, : self.alive]
+        return Body(self.stepper, self.rows, self.alive, x, v, time)
 
     @property
     def K(self) -> Any:
@@ -127,7 +127,6 @@ class Group:
         else:
             self._runge_kutta(members, interval, self.method, memory)
         for name, stepper in self.steppers.items():
-            members[name].store()
             newborn = np.arange(alive[name], systems[name].count)
             stepper.exceptions(systems[name], newborn, interval)
             stepper.events()
@@ -143,8 +142,7 @@ class Group:
         return found
 
     def _member(self, name: str, rows: Particles, alive: int) -> _Member:
-        y = np.concatenate([rows.position[:, :alive], rows.velocity[:, :alive]])
-        return _Member(self.steppers[name], rows, alive, y, np.zeros((3, alive), rows.real))
+        return _Member(self.steppers[name], rows, alive, np.zeros((3, 0), rows.real))
 
     def _split(
         self, members: dict[str, _Member], interval: Interval, method: Splitting, memory: Lasting
@@ -167,8 +165,8 @@ class Group:
         self, members: dict[str, _Member], interval: Interval, method: Explicit, memory: Lasting
     ) -> None:
         h, s = interval.length, method.stages
-        bases = {name: m.y.copy() for name, m in members.items()}
-        slopes = {name: np.zeros((s, *m.y.shape), m.y.dtype) for name, m in members.items()}
+        bases = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
+        slopes = {name: np.zeros((s, 6, m.alive), m.y.dtype) for name, m in members.items()}
         for i, row in enumerate((*method.a, method.b)):
             weights = np.array(row, float)
             for name, member in members.items():

@@ -45,6 +45,7 @@ class Law:
         self.nearest = int(nearest)
         self.rebuild = int(part.values["rebuild"].document())
         self.owner = f'interaction "{part.name}"'
+        self._last: tuple[float, dict[str, Any]] = (float("nan"), {})
         self._missing()
 
     def _missing(self) -> None:
@@ -62,6 +63,11 @@ class Law:
 
     def values(self, time: float) -> dict[str, Any]:
         """Parameters, and the constants that follow from them, at a time."""
+        if self._last[0] != time:
+            self._last = time, self._values(time)
+        return self._last[1]
+
+    def _values(self, time: float) -> dict[str, Any]:
         from types import SimpleNamespace
 
         found: dict[str, Any] = {}
@@ -163,7 +169,7 @@ class Law:
             width = _returned(self._kernel("near"), self.owner)
             writer.sweep("near", writer.call("near"), width)
         writer.finish(width)
-        return text.module({"int32": np.int32, "choose": choose}), width
+        return text.module({"int32": np.int32, "uint32": np.uint32, "choose": choose}), width
 
 
 class _Writer:
@@ -227,7 +233,7 @@ class _Writer:
         lines += "        slot = entry[first[c]:first[c + 1]]\n"
         for i, n in enumerate(other):
             lines += f"        q_{n} = room[{i}][:slot.size]\n"
-        lines += "        for q in range(slot.size):\n            k = slot[q]\n"
+        lines += "        for q in range(slot.size):\n            k = uint32(slot[q])\n"
         lines += "".join(f"            q_{n}[q] = s_{n}[k]\n" for n in other)
         lines += "        for i in range(cluster[c], cluster[c + 1]):\n"
         lines += "".join(f"            a_{n} = t_{n}[i]\n" for n in own)
