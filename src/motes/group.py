@@ -95,7 +95,7 @@ class Group:
             newborn = np.arange(alive[name], systems[name].count)
             stepper.exceptions(systems[name], newborn, interval)
             stepper.events()
-            stepper.deaths(systems[name], interval)
+            stepper.deaths(systems[name], np.arange(systems[name].count), interval)
 
     def _member(self, name: str, rows: Particles, alive: int) -> _Member:
         y = np.concatenate([rows.position[:, :alive], rows.velocity[:, :alive]])

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motes.compile.straight import THREATENED
 from motes.compile.system import CompiledSystem
 from motes.emission import Clock, Source
 from motes.jit import blocks, share
@@ -62,13 +63,12 @@ class Stepper:
     def step(self, rows: Particles, interval: Interval) -> None:
         """Take the system through one step, in place."""
         alive = self.births(rows, interval)
-        exceptional = [
-            self.integrate(rows, alive, interval),
-            self.newborns(rows, alive, interval),
-        ]
-        self.exceptions(rows, np.concatenate(exceptional), interval)
+        exceptional = np.concatenate(
+            [self.integrate(rows, alive, interval), self.newborns(rows, alive, interval)]
+        )
+        self.exceptions(rows, exceptional, interval)
         self.events()
-        self.deaths(rows, interval)
+        self.deaths(rows, exceptional, interval)
 
     def mass(self, rows: Particles, alive: int) -> NDArray[Any]:
         """Masses [kg] of the rows that were alive, (alive,)."""
@@ -145,7 +145,7 @@ class Stepper:
             low, high = first + parts[k][0], first + parts[k][1]
             kernel(
                 rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
-                interval.begin, interval.length, low, high,
+                interval.begin, interval.end, low, high,
             )  # fmt: skip
             if self.system.surfaces is not None:
                 found[k] = _marked(flags, low, high)
@@ -173,18 +173,19 @@ class Stepper:
     def events(self) -> None:
         """Nothing listens to births, impacts and deaths yet; what will goes here."""
 
-    def deaths(self, rows: Particles, interval: Interval) -> None:
-        """Take out the rows that a retirement claims."""
+    def deaths(
+        self, rows: Particles, exceptional: NDArray[np.int64], interval: Interval
+    ) -> None:
+        """Take out the rows that a retirement claims; the straight pass has marked its own."""
         if not self.system.motion.mortal or not rows.count:
             return
-        flags = self._flags(rows)
-        parts = _parts(rows.count, 1)
+        flags, parts = self._flags(rows), _parts(exceptional.size, 1)
 
         def retire(k: int) -> None:
             low, high = parts[k]
             self.system.retire(
                 rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
-                interval.end, 0.0, low, high,
+                interval.end, exceptional[low:high],
             )  # fmt: skip
 
         share(retire, len(parts))
@@ -207,9 +208,9 @@ def _parts(rows: int, cost: int) -> list[tuple[int, int]]:
 
 
 def _marked(flags: NDArray[np.uint8], low: int, high: int) -> NDArray[np.int64]:
-    """Rows from `low` to `high` whose flag is set: few, as a rule."""
+    """Rows from `low` to `high` that may meet a solid: few, as a rule."""
     words = np.flatnonzero(flags[low : low - (low - high) // WORD * WORD].view(np.uint64))
     near = (low + words[:, np.newaxis] * WORD + np.arange(WORD)).ravel()
-    near = near[flags[near] != 0]
+    near = near[flags[near] & THREATENED != 0]
     marked: NDArray[np.int64] = near[: np.searchsorted(near, high)]
     return marked

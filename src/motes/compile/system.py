@@ -98,7 +98,7 @@ class CompiledSystem:
 
     @property
     def retire(self) -> Any:
-        """Kernel: flags the rows that die."""
+        """Kernel: flags the dead among rows that took no straight path."""
         return self._fast_module["retire"]
 
     @cached_property
