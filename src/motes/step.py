@@ -183,6 +183,42 @@ class Stepper:
         share(care, len(parts))
         self.impacts += sum(impacts)
 
+    def rebounds(
+        self, rows: Particles, ends: NDArray[Any], alive: int, interval: Interval
+    ) -> bool:
+        """Take a group's flight, which leads to `ends` (6, alive), through its impacts.
+
+        Returns whether any row ends elsewhere.
+        """
+        if self.system.surfaces is None:
+            return False
+        threats, flags, parts = self.system.staged("threats"), self._flags(rows), _parts(alive, 1)
+        found = [NOTHING] * len(parts)
+
+        def threaten(k: int) -> None:
+            low, high = parts[k]
+            threats(
+                rows.position, rows.velocity, ends, flags, self.system.K_staged, interval.begin,
+                interval.end, low, high,
+            )  # fmt: skip
+            found[k] = _marked(flags, low, high)
+
+        share(threaten, len(parts))
+        threatened = np.concatenate([NOTHING, *found])
+        parts = _parts(threatened.size, 64)
+        counts = [(0, 0)] * len(parts)
+
+        def care(k: int) -> None:
+            low, high = parts[k]
+            counts[k] = self.system.rebounds(
+                rows.position, rows.velocity, ends, rows.birth, rows.columns, threatened[low:high],
+                self.system.K_exact, self.system.K_solid, interval.begin, interval.length,
+            )  # fmt: skip
+
+        share(care, len(parts))
+        self.impacts += sum(hits for hits, _ in counts)
+        return any(changed for _, changed in counts)
+
     def events(self) -> None:
         """Nothing listens to births, impacts and deaths yet; what will goes here."""
 
