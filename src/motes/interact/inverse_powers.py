@@ -48,4 +48,6 @@ class InversePowers:
     @kernel
     def potential(p, a, b, r):
         repulsion = p.k1 * pow(r.length, 1.0 - p.m) / (p.m - 1.0)
-        return repulsion - p.k2 * pow(r.length, 1.0 - p.n) / (p.n - 1.0) - p.shift + p.slope * r.length
+        return (
+            repulsion - p.k2 * pow(r.length, 1.0 - p.n) / (p.n - 1.0) - p.shift + p.slope * r.length
+        )
