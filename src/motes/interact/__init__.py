@@ -30,6 +30,9 @@ class _Common:
 
 
 class _Near(_Common):
+    targets: Any = quantity((), table="names")
+    """Systems that feel the law; all that take part when none is named."""
+
     sources: Any = quantity((), table="names")
     """Systems whose particles are felt by all that take part; all of them when none is named."""
 
