@@ -19,8 +19,9 @@ SCOPE_OF = {
 """What a curve can run over, and the scope that this gives it.
 
 `time` is the scene's time in seconds; `random` a uniform number from 0 to 1 drawn at birth; `life`
-the age divided by the lifetime; `speed` the length of the velocity in m/s; `order`, for colours, how much a particle's twelve nearest
-neighbours are a crystal's, from 0 to 1 (`motes.matter.local_order`).
+the age divided by the lifetime; `speed` the length of the velocity in m/s; `order`, for colours,
+how much a particle's twelve nearest neighbours are a crystal's, from 0 to 1
+(`motes.matter.local_order`).
 """
 
 TABLE_SIZE = 256
