@@ -222,9 +222,9 @@ class _Writer:
         lines, stages = "    h2 = h * h\n", []
         for place, row, square in zip(places, table, squares, strict=True):
             start = [f"{a} + F({float(place)!r}) * h * v{a}" if place else a for a in AXES]
-            state = [
-                _sum(s, square, "h2", a) for s, a in zip(start, AXES, strict=True)
-            ] + [_sum(f"v{a}", row, "h", a) for a in AXES]
+            state = [_sum(s, square, "h2", a) for s, a in zip(start, AXES, strict=True)] + [
+                _sum(f"v{a}", row, "h", a) for a in AXES
+            ]
             stages.append(state)
         for i, state in enumerate(stages[:-1]):
             names = tuple(f"{n}_{i}" for n in STATE)
