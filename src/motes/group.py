@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.catalog import Component
+from motes.capture import Captures
 from motes.compile.staged import combine
+from motes.constrain import Constraints, Ground
 from motes.errors import SceneError
 from motes.jit import blocks, share
 from motes.state import Particles
@@ -45,6 +47,7 @@ class _Member:
     y: NDArray[Any]
     push: NDArray[Any]
     mass: NDArray[Any]
+    size: NDArray[Any]
 
     def store(self) -> None:
         """Write the state back into the particles' columns."""
@@ -67,14 +70,26 @@ class Group:
     """Steps systems that interact."""
 
     def __init__(
-        self, steppers: dict[str, Stepper], interactions: tuple[tuple[str, Component], ...]
+        self,
+        steppers: dict[str, Stepper],
+        interactions: tuple[tuple[str, Component], ...],
+        solids: tuple[tuple[str, Component], ...] = (),
     ) -> None:
-        self.steppers, self.interactions = steppers, interactions
+        self.steppers = steppers
+        self.interactions = _defining("accelerations", interactions)
+        laws = _defining("velocities", interactions)
+        self.constraints = Constraints(laws, Ground(solids if laws else ()))
+        self.captures = Captures(_defining("captures", interactions))
         motions = [stepper.system.motion for stepper in steppers.values()]
         self.method = motions[0].method
         who = f"systems {', '.join(steppers)} interact"
         if any(motion.method is not self.method for motion in motions):
             raise SceneError(f"{who} and must have one integrator.")
+        if laws and not isinstance(self.method, Splitting):
+            raise SceneError(
+                f'{who} by "{laws[0][1].name}", a law of velocities, which holds between kick and '
+                'drift: choose integrator = "semi_implicit_euler" or another splitting method.'
+            )
         if not all(motion.inertial for motion in motions):
             raise SceneError(f"{who} and must have velocities: give them a force besides flows.")
         if any(stepper.system.surfaces for stepper in steppers.values()):
@@ -92,19 +107,23 @@ class Group:
             self._runge_kutta(members, interval, self.method)
         for name, stepper in self.steppers.items():
             members[name].store()
+        self.captures.find(systems, interval.end, alive, _values)
+        for name, stepper in self.steppers.items():
             newborn = np.arange(alive[name], systems[name].count)
             stepper.exceptions(systems[name], newborn, interval)
             stepper.events()
-            stepper.deaths(systems[name], interval)
+            stepper.deaths(systems[name], interval, self.captures.rows(name))
 
     def _member(self, name: str, rows: Particles, alive: int) -> _Member:
         y = np.concatenate([rows.position[:, :alive], rows.velocity[:, :alive]])
         stepper = self.steppers[name]
         push, mass = np.zeros((3, alive), rows.real), stepper.mass(rows, alive)
-        return _Member(stepper, rows, alive, y, push, mass)
+        size = stepper.trait("size", rows, alive, 0.0) if self.constraints.laws else mass
+        return _Member(stepper, rows, alive, y, push, mass, size)
 
     def _split(self, members: dict[str, _Member], interval: Interval, method: Splitting) -> None:
         h = interval.length
+        before = {name: m.y[3:].copy() for name, m in members.items() if self.constraints.laws}
         for kick, drift, place in zip(
             method.kicks, (*method.drifts, 0.0), method.times, strict=True
         ):
@@ -114,6 +133,7 @@ class Group:
                 for member in members.values():
                     member.each("kick", member.K, time, kick * h)
             if drift:
+                self.constraints.apply(members, before, time, drift * h, _partners, _values)
                 for member in members.values():
                     member.each("drift", member.K, time, drift * h)
 
@@ -162,13 +182,20 @@ class Group:
         )
 
 
+def _defining(
+    kernel: str, interactions: tuple[tuple[str, Component], ...]
+) -> tuple[tuple[str, Component], ...]:
+    """The interactions that define a kernel."""
+    return tuple(pair for pair in interactions if type(pair[1]).kernel(kernel) is not None)
+
+
 def _kernel(interaction: Component, name: str) -> Callable[..., Any]:
     function = type(interaction).kernel(name)
     assert function is not None
     return function
 
 
-def _partners(interaction: Component, bodies: list[Bodies]) -> list[Bodies]:
+def _partners(interaction: Component, bodies: list[Any]) -> list[Any]:
     """The bodies that take part in an interaction."""
     named = interaction.values["systems"].document()
     return [body for body in bodies if not named or body.name in named]

@@ -7,8 +7,10 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motes.appearance import Look
+from motes.capture import CAPTURE
 from motes.catalog import Component, find
 from motes.compile.motion import Motion
 from motes.compile.system import CompiledSystem
@@ -81,6 +83,7 @@ class Simulation:
             tuple((component_address(system, r), r) for r in retire),
             traits,
             method(system.integrator or scene.integrator),
+            addressed(scene.solid, ()),
         )
         emitters = addressed((), system.emit)
         compiled = CompiledSystem(
@@ -112,6 +115,7 @@ class Simulation:
                     for part, link in zip(self.scene.interact, links, strict=True)
                     if link & group
                 ),
+                tuple((component_address(None, part), part) for part in self.scene.solid),
             )
             for group in groups
         ]
@@ -135,6 +139,12 @@ class Simulation:
     def impacts(self) -> int:
         """Impacts on solids so far."""
         return sum(s.impacts for s in self._steppers.values())
+
+    @property
+    def captures(self) -> NDArray[Any]:
+        """Captures so far, by time: structured (n,) with time [s], hunter, prey (ids), place [m]."""
+        kept = [part for group in self._groups for part in group.captures.kept]
+        return np.sort(np.concatenate([np.zeros(0, CAPTURE), *kept]), order=("time", "prey"))
 
     def __getitem__(self, name: str) -> View:
         if name not in self._systems:
@@ -240,12 +250,15 @@ class Simulation:
         """A copy of the state, taken to a time beyond it by steps and a partial one."""
         state = self._state.copy()
         impacts = {name: s.impacts for name, s in self._steppers.items()}
+        captures = [len(group.captures.kept) for group in self._groups]
         while (ahead := time - self._step_begin(state)) > EDGE * self.scene.step:
             whole = ahead > (1 - EDGE) * self.scene.step
             end = self._step_begin(state, 1) if whole else time
             self._advance(state, Interval(self._step_begin(state), end))
         for name, stepper in self._steppers.items():
             stepper.impacts = impacts[name]
+        for group, length in zip(self._groups, captures, strict=True):
+            del group.captures.kept[length:]
         return state, time
 
     def frames(self, first: int | None = None, last: int | None = None) -> Iterator[Frame]:

@@ -4,6 +4,10 @@ An interaction that is a global law, such as gravity, defines `accelerations(p, 
 positions and masses of all systems that take part, an array (3, n) [m/s2] for each of them. Systems
 that share an interaction are one group and take every stage of a step together. It may define
 `energy(p, bodies)`, their potential energy [J].
+
+A law of velocities defines `velocities(p, walkers, step)`: what the particles may do of what the
+forces want (`constrain.py`). A law of captures defines `captures(p, hunters, prey)`: which
+particles are caught at a step's end (`capture.py`).
 """
 
 from __future__ import annotations
@@ -18,5 +22,5 @@ class _Common:
     """Names of the systems that take part; all of them when none is named."""
 
 
-KIND = Kind("interact", "interaction", "scene", ("accelerations",), _Common)
+KIND = Kind("interact", "interaction", "scene", ("accelerations", "velocities", "captures"), _Common)
 __getattr__ = attribute("interact")

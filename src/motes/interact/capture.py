@@ -1,0 +1,43 @@
+"""Hunters that catch their prey."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from motes.catalog import Number, component, quantity
+
+if TYPE_CHECKING:
+    from motes.capture import Animals
+
+
+@component
+class Capture:
+    """Hunters catch what comes within a radius, and it dies: each the nearest one, one a step.
+
+    All that take part and are no hunters are prey. `Simulation.captures` tells who caught whom,
+    when and where.
+    """
+
+    hunters: Any = quantity((), table="names")
+    """Names of the systems that catch."""
+
+    radius: Number = quantity(0.5, "m", above=0)
+    """Distance within which one is caught."""
+
+    def captures(p: Any, hunters: Sequence[Animals], prey: Sequence[Animals]) -> list[Any]:
+        """(hunter, its rows, prey, its rows) of those that are caught."""
+        from motes.neighbours import nearest
+
+        found = []
+        for victims in prey:
+            for hunter in hunters:
+                if not victims.position.size or not hunter.position.size:
+                    continue
+                index, far = nearest(victims.position.T, 1, targets=hunter.position.T)
+                near = np.flatnonzero(far[:, 0] <= p.radius)
+                rows, first = np.unique(index[near, 0], return_index=True)
+                found.append((hunter.name, near[first], victims.name, rows))
+        return found
