@@ -1,9 +1,11 @@
 """Captures: who is caught by whom at a step's end; the caught die in the deaths phase.
 
-Laws that define `captures(p, hunters, prey)` see positions at the step's end. All captures of a
+Laws that define `captures(p, hunters, prey, luck, step)` see positions at the step's end;
+`luck(hunter ids, prey ids)` gives a number in [0, 1) for each pair of ids. All captures of a
 simulation are kept: instant, place, and both ids.
 """
 
+# mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.catalog import Component
+from motes.jit import EXACT, jit
+from motes.philox import channel, draw, uniform_double
 from motes.state import Particles
 
 CAPTURE = np.dtype(
@@ -27,6 +31,8 @@ class Animals(NamedTuple):
     name: str
     position: NDArray[Any]
     """(3, n) at the step's end [m]"""
+    ids: NDArray[np.uint64]
+    """(n,)"""
 
 
 class Captures:
@@ -46,16 +52,28 @@ class Captures:
     def find(
         self,
         systems: Mapping[str, Particles],
-        end: float,
+        interval: tuple[float, float],
+        seed: np.uint64,
         alive: Mapping[str, int],
         values: Callable[[Component, float], Any],
     ) -> None:
-        """Find who is caught at a step's end [s]; of several laws the first in order has it."""
+        """Find who is caught at the end of an interval [s]; of several laws the first has it."""
         self.caught = {}
-        for _, law in self.laws:
-            animals = {
-                name: Animals(name, systems[name].position[:, :n]) for name, n in alive.items()
-            }
+        begin, end = interval
+        animals = {
+            name: Animals(name, systems[name].position[:, :n], systems[name].ids[:n])
+            for name, n in (alive.items() if self.laws else ())
+        }
+        for address, law in self.laws:
+
+            def luck(
+                hunter: NDArray[Any], prey: NDArray[Any], channel: int = channel(address)
+            ) -> NDArray[Any]:
+                drawn = np.empty(len(hunter))
+                tick = np.array([begin]).view(np.uint32)
+                _draw(seed, hunter, prey, np.uint32(channel), tick[0] ^ tick[1], drawn)
+                return drawn
+
             named, hunting = (law.values[key].document() for key in ("systems", "hunters"))
             hunters = [a for name, a in animals.items() if name in hunting]
             prey = [
@@ -64,7 +82,9 @@ class Captures:
             ]  # fmt: skip
             captures = type(law).kernel("captures")
             assert captures is not None
-            for hunter, i, victim, j in captures(values(law, end), hunters, prey):
+            for hunter, i, victim, j in captures(
+                values(law, end), hunters, prey, luck, end - begin
+            ):
                 self._note(systems, end, hunter, i, victim, j)
 
     def _note(
@@ -81,3 +101,12 @@ class Captures:
         found["time"], found["hunter"] = end, systems[hunter].ids[i]
         found["prey"], found["place"] = systems[victim].ids[j], systems[victim].position[:, j].T
         self.kept.append(np.sort(found, order="prey"))
+
+
+@jit(flags=EXACT)
+def _draw(seed: Any, hunter: Any, prey: Any, channel: Any, tick: Any, out: Any) -> None:
+    """Uniform numbers that follow from two particles, the law and the instant."""
+    for i in range(out.size):
+        pair = hunter[i] ^ (prey[i] * np.uint64(0x9E3779B97F4A7C15))
+        a, b, _, _ = draw(seed, pair, channel, tick)
+        out[i] = uniform_double(a, b)

@@ -107,7 +107,9 @@ class Group:
             self._runge_kutta(members, interval, self.method)
         for name, stepper in self.steppers.items():
             members[name].store()
-        self.captures.find(systems, interval.end, alive, _values)
+        seed = next(iter(self.steppers.values())).seed
+        span = (interval.begin, interval.end)
+        self.captures.find(systems, span, seed, alive, _values)
         for name, stepper in self.steppers.items():
             newborn = np.arange(alive[name], systems[name].count)
             stepper.exceptions(systems[name], newborn, interval)

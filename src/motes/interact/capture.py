@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 class Capture:
     """Hunters catch what comes within a radius, and it dies: each the nearest one, one a step.
 
-    All that take part and are no hunters are prey. `Simulation.captures` tells who caught whom,
+    While one is near, the chance of a capture in a time h is 1 - exp(-rate h). All that take part and are no hunters are prey. `Simulation.captures` tells who caught whom,
     when and where.
     """
 
@@ -27,8 +27,13 @@ class Capture:
     radius: Number = quantity(0.5, "m", above=0)
     """Distance within which one is caught."""
 
-    def captures(p: Any, hunters: Sequence[Animals], prey: Sequence[Animals]) -> list[Any]:
-        """(hunter, its rows, prey, its rows) of those that are caught."""
+    rate: Number = quantity(1e6, "1/s", above=0)
+    """Captures a second while one is near; a very high one misses nothing."""
+
+    def captures(
+        p: Any, hunters: Sequence[Animals], prey: Sequence[Animals], luck: Any, step: float
+    ) -> list[Any]:
+        """(hunter, its rows, prey, its rows) of those that are caught in a step of a length [s]."""
         from motes.neighbours import nearest
 
         found = []
@@ -37,7 +42,9 @@ class Capture:
                 if not victims.position.size or not hunter.position.size:
                     continue
                 index, far = nearest(victims.position.T, 1, targets=hunter.position.T)
-                near = np.flatnonzero(far[:, 0] <= p.radius)
+                drawn = luck(hunter.ids, victims.ids[index[:, 0]])
+                caught = (far[:, 0] <= p.radius) & (drawn < -np.expm1(-p.rate * step))
+                near = np.flatnonzero(caught)
                 rows, first = np.unique(index[near, 0], return_index=True)
                 found.append((hunter.name, near[first], victims.name, rows))
         return found

@@ -36,6 +36,9 @@ class Crowd:
     wall_horizon: Number = quantity(0.5, "s", above=0)
     """The same for solids."""
 
+    height: Number = quantity(1.0, "m")
+    """Height above its place at which a person minds solids: lower ones are stepped over."""
+
     margin: Number = quantity(0.05, "m", at_least=0)
     """Gap that two keep between them if they can."""
 
@@ -52,7 +55,8 @@ class Crowd:
         joined = [np.concatenate([getattr(w, key) for w in walkers], axis=-1)
                   for key in ("position", "velocity", "wanted", "size")]  # fmt: skip
         position, velocity, wanted, size = joined
-        walls = walkers[0].walls(position, size / 2, p.wall_horizon, p.wall_horizon * p.top_speed)
+        chest = position + np.array([[0], [0], [p.height]], position.dtype)
+        walls = walkers[0].walls(chest, size / 2, p.wall_horizon, p.wall_horizon * p.top_speed)
         rules = Rules(p.reach, p.margin, max(p.horizon, step), step, p.top_speed, p.density_slows)
         chosen = avoid(position[:2], velocity[:2], wanted[:2], size / 2, walls, rules, p.nearest)
         ends = np.cumsum([len(w.size) for w in walkers])
