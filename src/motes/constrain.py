@@ -130,7 +130,7 @@ class Constraints:
 
         for _, law in self.laws:
             everybody = [
-                Walkers(name, m.y[:3], before[name], m.y[3:], m.size, walls)
+                Walkers(name, m.y[:3], before[name], m.y[3:], _size(m, time), walls)
                 for name, m in members.items()
             ]
             chosen = partners(law, everybody)
@@ -139,3 +139,8 @@ class Constraints:
             new = velocities(values(law, time), chosen, step)
             for walker, velocity in zip(chosen, new, strict=True):
                 members[walker.name].y[3 : 3 + len(velocity)] = velocity
+
+
+def _size(member: Any, time: float) -> Array:
+    size: Array = member.stepper.trait("size", member.rows, member.alive, time)
+    return size
