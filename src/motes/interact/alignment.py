@@ -30,15 +30,16 @@ class Alignment:
         return float(p.radius)
 
     def constants(p: Any) -> dict[str, float]:
-        """`edge`: cosine of the cone's half angle, below -1 where it is open."""
-        return {"edge": -2.0 if p.angle >= 180 else float(np.cos(np.radians(p.angle)))}
+        """`edge`: cosine of the cone's half angle, below -1 where it is open; 1 / radius."""
+        edge = -2.0 if p.angle >= 180 else float(np.cos(np.radians(p.angle)))
+        return {"edge": edge, "per_radius": 1.0 / p.radius}
 
     @kernel
     def near(p, a, b, r):
         v = sqrt(a.vx * a.vx + a.vy * a.vy + a.vz * a.vz)
         ahead = -(a.vx * r.x + a.vy * r.y + a.vz * r.z)
         seen = 1.0 if ahead >= p.edge * v * r.length else 0.0
-        w = seen * (1.0 - r.length / p.radius)
+        w = seen * (1.0 - r.length * p.per_radius)
         return w * (b.vx - a.vx), w * (b.vy - a.vy), w * (b.vz - a.vz), w
 
     @kernel

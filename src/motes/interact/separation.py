@@ -24,9 +24,13 @@ class Separation:
         """Support radius [m]."""
         return float(p.radius)
 
+    def constants(p: Any) -> dict[str, float]:
+        """1 / radius."""
+        return {"per_radius": 1.0 / p.radius}
+
     @kernel
     def near(p, a, b, r):
-        w = (1.0 - r.length / p.radius) / max(r.length, 1e-6)
+        w = (1.0 - r.length * p.per_radius) / (r.length + 1e-6)
         return w * r.x, w * r.y, w * r.z
 
     @kernel
