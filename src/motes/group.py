@@ -106,10 +106,6 @@ class Group:
             )
         if not all(motion.inertial for motion in motions):
             raise SceneError(f"{who} and must have velocities: give them a force besides flows.")
-        if any(stepper.system.surfaces for stepper in steppers.values()):
-            raise SceneError(
-                f"{who}, and such systems do not bounce yet: write collides = false in the solids."
-            )
 
     def _nearby(self, precision: str) -> Nearby:
         laws = []
@@ -138,6 +134,8 @@ class Group:
         else:
             self._runge_kutta(members, interval, self.method, memory)
         for name, stepper in self.steppers.items():
+            if stepper.rebounds(systems[name], members[name].y, alive[name], interval):
+                memory.push = None
             members[name].store()
         seed = next(iter(self.steppers.values())).seed
         span = (interval.begin, interval.end)
@@ -146,7 +144,8 @@ class Group:
             newborn = np.arange(alive[name], systems[name].count)
             stepper.exceptions(systems[name], newborn, interval)
             stepper.events()
-            stepper.deaths(systems[name], interval, self.captures.rows(name))
+            rows, caught = systems[name], self.captures.rows(name)
+            stepper.deaths(rows, np.arange(rows.count), interval, caught)
 
     def _bodies(
         self, systems: dict[str, Particles], alive: dict[str, int], time: float
