@@ -26,8 +26,10 @@ class Avoid:
     def acceleration(p, q, t):
         gap, nx, ny, nz = q.obstacle
         closing = max(-(q.vx * nx + q.vy * ny + q.vz * nz), 0.0)
-        room = max(gap - p.margin, 0.05 * p.margin)
-        need = 0.5 * closing * max(closing / room - 1.0 / p.horizon, 0.0)
+        least = 0.01 * p.margin
+        room = max(gap - p.margin, least)
+        early = 1.0 / p.horizon if gap - p.margin > least else 0.0
+        need = 0.5 * closing * max(closing / room - early, 0.0)
         # Along the surface; head on, where that has no direction, to one side.
         sx = q.vx + closing * (nx - 0.05 * ny)
         sy = q.vy + closing * (ny + 0.05 * nx)
