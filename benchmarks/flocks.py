@@ -41,7 +41,9 @@ def flock(n: int) -> motes.Simulation:
         "boids",
         emit=[
             motes.emit.Box(
-                burst=[{"count": n}], size=(edge,) * 3, velocity={"low": [-1.5] * 3, "high": [1.5] * 3}
+                burst=[{"count": n}],
+                size=(edge,) * 3,
+                velocity={"low": [-1.5] * 3, "high": [1.5] * 3},
             )
         ],
         force=[motes.force.Cruise(speed=SPEED), motes.force.Agility(top_speed=2 * SPEED)],

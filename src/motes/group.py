@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.catalog import Component
 from motes.capture import Captures
+from motes.catalog import Component
 from motes.compile.pairs import Law
 from motes.compile.staged import combine
 from motes.constrain import Constraints, Ground

@@ -150,7 +150,7 @@ class Simulation:
 
     @property
     def captures(self) -> NDArray[Any]:
-        """Captures so far, by time: structured (n,) with time [s], hunter, prey (ids), place [m]."""
+        """Captures so far, by time: structured, time [s], hunter and prey (ids), place [m]."""
         kept = [part for group in self._groups for part in group.captures.kept]
         return np.sort(np.concatenate([np.zeros(0, CAPTURE), *kept]), order=("time", "prey"))
 

@@ -183,9 +183,7 @@ class Stepper:
         share(care, len(parts))
         self.impacts += sum(impacts)
 
-    def rebounds(
-        self, rows: Particles, ends: NDArray[Any], alive: int, interval: Interval
-    ) -> bool:
+    def rebounds(self, rows: Particles, ends: NDArray[Any], alive: int, interval: Interval) -> bool:
         """Take a group's flight, which leads to `ends` (6, alive), through its impacts.
 
         Returns whether any row ends elsewhere.

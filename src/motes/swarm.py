@@ -63,7 +63,7 @@ class Swarm:
     ) -> None:
         """Add the laws' accelerations (3, n) [m/s2] to pushes; note whose rows are scattered."""
         time = next(iter(bodies.values())).time
-        positions = {name: self._inside(bodies[name].position) for name in self.systems}
+        positions = {name: self._inside(bodies[name]) for name in self.systems}
         cut = self._grid(list(positions.values()), max(law.reach(time) for law, _, _ in self.laws))
         cells = {name: sort(position, cut) for name, position in positions.items()}
         for name, found in cells.items():
@@ -76,7 +76,7 @@ class Swarm:
             sources = sorted({name for _, _, names in acting for name in names})
             if not acting or not cells[target].row.size:
                 continue
-            sums = {id(law): np.zeros((law.sums(), cells[target].row.size), self.real)
+            sums: dict[int, Array] = {id(law): np.zeros((law.sums(), cells[target].row.size), self.real)
                     for law, _, _ in acting}  # fmt: skip
             for source in sources:
                 felt = [law for law, _, names in acting if source in names]
@@ -90,12 +90,12 @@ class Swarm:
 
     def order(self, body: Any) -> NDArray[np.int32]:
         """Rows of one system in the order of cells."""
-        position = self._inside(body.position)
+        position = self._inside(body)
         reach = max(law.reach(body.time) for law, _, _ in self.laws)
         return sort(position, self._grid([position], reach)).row
 
-    def _inside(self, position: Array) -> Array:
-        found = np.array(position, self.real)
+    def _inside(self, body: Any) -> Array:
+        found: Array = np.array(body.position[:, : body.alive], self.real)
         if not np.isfinite(found).all():
             found = np.where(np.isfinite(found), found, 0).astype(self.real)
         wrapped(found, self.periodic)
@@ -107,7 +107,7 @@ class Swarm:
         low = np.min([p.min(axis=1) for p in inside], axis=0) if inside else np.zeros(3)
         high = np.max([p.max(axis=1) for p in inside], axis=0) if inside else np.zeros(3)
         size = self.periodic.size
-        box = np.where(size > 0, size, np.inf).astype(self.real)
+        box: Array = np.where(size > 0, size, np.inf).astype(self.real)
         low = np.where(size > 0, 0.0, low)
         cut = grid(np.stack([low, np.where(size > 0, size, high)]).astype(float), reach, box)
         return cut._replace(low=np.where(size > 0, self.periodic.low, cut.low))
@@ -144,9 +144,9 @@ class Swarm:
         mine = tuple(self._column(target, key, cells, bodies, packed) for key in read(laws, 0))
         theirs = np.stack([self._column(source, key, cells, bodies, packed) for key in other])
         numbers = tuple(law.numbers(time, self.real) for law in laws)
-        limits = np.array([self.real(law.reach(time)) ** 2 for law in laws], self.real)
+        limits: Array = np.array([self.real(law.reach(time)) ** 2 for law in laws], self.real)
         n = cells[target].row.size
-        out = np.empty((sum(law.sums() for law in laws), n), self.real)
+        out: Array = np.empty((sum(law.sums() for law in laws), n), self.real)
         parts = blocks(n, TARGETS)
 
         def sweep(k: int) -> None:

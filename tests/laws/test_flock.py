@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.plain.flock import boids
 
 import motes
-from tests.plain.flock import boids
 
 RULES = {
     "separation": {"radius": 0.8, "strength": 3.0},
@@ -174,7 +174,7 @@ def hunt(**capture: Any) -> motes.Simulation:
 
 
 def test_captures_are_deaths_and_are_told() -> None:
-    """Each mouse dies once the hawk is within the radius: at 1 + k - 0.15 s, sqrt(0.25^2 - 0.2^2)."""
+    """Each mouse dies once the hawk is within the radius: 0.15 m before it is beside it."""
     sim = hunt()
     sim.run(until=5.5)
     assert len(sim["mice"]) == 5

@@ -11,6 +11,7 @@ import motes
 from motes.catalog import component, quantity
 from motes.kernel import kernel, sin
 
+
 @component(kind="emit", name="test_lattice")
 class Lattice:
     """The k-th atom at the k-th place of a cubic lattice, with a velocity that looks random."""

@@ -51,8 +51,12 @@ def gather_kernel(laws: Sequence[Law]) -> Any:
         # Whoever does not count is put at the reach and weighs nothing: a conditional sum would
         # keep the loop from becoming vector instructions.
         body += f"                near = square <= limit{i}\n"
-        body += f"                weight, u2 = F(1.0 if near else 0.0), square if near else limit{i}\n"
-        body += f"                ux, far = rx if near else reach{i}, length if near else reach{i}\n"
+        body += (
+            f"                weight, u2 = F(1.0 if near else 0.0), square if near else limit{i}\n"
+        )
+        body += (
+            f"                ux, far = rx if near else reach{i}, length if near else reach{i}\n"
+        )
         body += "                uy, uz = ry if near else F(0.0), rz if near else F(0.0)\n"
         body += f"                {', '.join(names)}, = {call}\n"
         for k in range(place, place + width):
@@ -63,7 +67,8 @@ def gather_kernel(laws: Sequence[Law]) -> Any:
     lines = (
         "@kernel\ndef gather(numbers, limits, grid, targets, key, sources, cells, itself, "
         "begin, end, room_, out):\n"
-        "    runs, slots, room, near_, pick, kept = room_\n    number, points, size, i = 0, 0, 0, begin\n    most = limits.max()\n"
+        "    runs, slots, room, near_, pick, kept = room_\n"
+        "    number, points, size, i = 0, 0, 0, begin\n    most = limits.max()\n"
         f"{prelude}"
     )
     lines += "".join(f"    t_{n} = targets[{k}]\n" for k, n in enumerate(own))
@@ -85,8 +90,9 @@ def gather_kernel(laws: Sequence[Law]) -> Any:
     lines += "".join(f"            a_{n} = t_{n}[t]\n" for n in own)
     lines += start + "            place = (a_x, a_y, a_z)\n"
     lines += "            held = choose(place, room, slots[:points], me, most, near_, pick)\n"
-    lines += "            for e in range(held):\n                q = pick[e]\n                k = slots[q]\n"
-    for k, n in enumerate(other):
+    lines += "            for e in range(held):\n"
+    lines += "                q = pick[e]\n                k = slots[q]\n"
+    for n in other:
         lines += f"                k_{n}[e] = {f'c_{n}[q]' if n in AXES else f's_{n}[k]'}\n"
     lines += f"            size = -(-held // {WIDTH}) * {WIDTH}\n"
     lines += "            for e in range(held, size):\n"
@@ -124,9 +130,7 @@ def fill(number: Any, runs: Any, sources: Any, room: Any, slot: Any) -> None:
 
 
 @jit(inline=True)
-def choose(
-    place: Any, room: Any, slot: Any, me: Any, limit: Any, near: Any, pick: Any
-) -> Any:
+def choose(place: Any, room: Any, slot: Any, me: Any, limit: Any, near: Any, pick: Any) -> Any:
     """Write which candidates are within reach of a place, and not the one itself; how many."""
     x, y, z = place
     xs, ys, zs = room[0][: slot.size], room[1][: slot.size], room[2][: slot.size]

@@ -32,9 +32,7 @@ def seen(S, x, y, z):
 """
 """Distance from the nearest solid, and its normal from four points around."""
 
-NOTHING_SEEN = (
-    "@inline\ndef seen(S, x, y, z):\n    return F(1e9), F(0.0), F(0.0), F(1.0)\n"
-)
+NOTHING_SEEN = "@inline\ndef seen(S, x, y, z):\n    return F(1e9), F(0.0), F(0.0), F(1.0)\n"
 """Without solids the nearest is far below."""
 
 KEPT = ("life", "mass")
@@ -273,9 +271,9 @@ class _Writer:
         lines, stages = "    h2 = h * h\n", []
         for place, row, square in zip(places, table, squares, strict=True):
             start = [f"{a} + F({float(place)!r}) * h * v{a}" if place else a for a in AXES]
-            state = [
-                _sum(s, square, "h2", a) for s, a in zip(start, AXES, strict=True)
-            ] + [_sum(f"v{a}", row, "h", a) for a in AXES]
+            state = [_sum(s, square, "h2", a) for s, a in zip(start, AXES, strict=True)] + [
+                _sum(f"v{a}", row, "h", a) for a in AXES
+            ]
             stages.append(state)
         for i, state in enumerate(stages[:-1]):
             names = tuple(f"{n}_{i}" for n in STATE)

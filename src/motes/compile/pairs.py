@@ -175,6 +175,7 @@ class Writer:
         self._names: dict[str, str] = {}
 
     def p(self) -> str:
+        """An expression for `p`, from the array `numbers`."""
         expressions, place = {}, 0
         for key, width in self.law._fields.items():
             expressions[key] = packed([f"numbers[{place + k}]" for k in range(width)])

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 class Capture:
     """Hunters catch what comes within a radius, and it dies: each the nearest one, one a step.
 
-    While one is near, the chance of a capture in a time h is 1 - exp(-rate h). All that take part and are no hunters are prey. `Simulation.captures` tells who caught whom,
-    when and where.
+    While one is near, the chance of a capture in a time h is 1 - exp(-rate h). All that take part
+    and are no hunters are prey. `Simulation.captures` tells who caught whom, when and where.
     """
 
     hunters: Any = quantity((), table="names")

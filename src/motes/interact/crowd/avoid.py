@@ -39,11 +39,11 @@ class Rules(NamedTuple):
 
 
 class Walls(NamedTuple):
-    """Half-planes of walls: those of agent i are plane[i, :count[i]]."""
+    """Half-planes of walls: those of agent i are plane[i, :held[i]]."""
 
     plane: Array
     """(n, most, 3)"""
-    count: NDArray[np.int64]
+    held: NDArray[np.int64]
     """(n,)"""
 
 
@@ -73,7 +73,7 @@ def _room(points: int, most: int, walls: int, real: Any) -> _Room:
 
 @jit(inline=True, flags=STRICT)
 def _choose(points: Any, itself: Any, limit: Any, room: Any) -> Any:
-    """Write which of the points are the nearest, nearest first, then of lower rows; their number."""
+    """Write which points are the nearest, nearest first, then of lower rows; their number."""
     square, row, nearest = room.square, room.row, room.nearest
     most, held = nearest.size - 1, 0
     for q in range(points):
@@ -134,10 +134,10 @@ def _avoid(
             dx, dy = others[0, q] - x, others[1, q] - y
             square[q] = dx * dx + dy * dy
         gx, gy = np.float64(wanted[0, i]), np.float64(wanted[1, i])
+        top = rules.top_speed
         if rules.crowded:
-            pace = walking(_density(points, reach2, x, y, gx, gy, room))
-            gx, gy = pace * gx, pace * gy
-        hard = walls.count[i]
+            top *= walking(_density(points, reach2, x, y, gx, gy, room))
+        hard = walls.held[i]
         for k in range(hard):
             _note(room.planes, k, walls.plane[i, k, 0], walls.plane[i, k, 1], walls.plane[i, k, 2])
         vx, vy, mine = np.float64(velocity[0, i]), np.float64(velocity[1, i]), np.float64(radius[i])
@@ -159,7 +159,6 @@ def _avoid(
             plane = reciprocal(px, py, ux, uy, vx, vy, both, rules.horizon, rules.step)
             _note(room.planes, held, plane[0], plane[1], plane[2])
             held += 1
-        top = rules.top_speed
         out[0, i], out[1, i] = allowed(room.planes, hard, held, top, gx, gy, room.other)
     return end, np.int64(0)
 
