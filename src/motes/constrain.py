@@ -130,7 +130,14 @@ class Constraints:
 
         for _, law in self.laws:
             everybody = [
-                Walkers(name, m.y[:3], before[name], m.y[3:], _size(m, time), walls)
+                Walkers(
+                    name,
+                    m.y[:3, : m.alive],
+                    before[name],
+                    m.y[3:, : m.alive],
+                    _size(m, time),
+                    walls,
+                )  # fmt: skip
                 for name, m in members.items()
             ]
             chosen = partners(law, everybody)
@@ -138,7 +145,8 @@ class Constraints:
             assert velocities is not None
             new = velocities(values(law, time), chosen, step)
             for walker, velocity in zip(chosen, new, strict=True):
-                members[walker.name].y[3 : 3 + len(velocity)] = velocity
+                member = members[walker.name]
+                member.y[3 : 3 + len(velocity), : member.alive] = velocity
 
 
 def _size(member: Any, time: float) -> Array:

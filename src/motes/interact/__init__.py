@@ -10,7 +10,9 @@ r.square, r.length.
 
 A law without a reach, such as gravity, defines `accelerations(p, bodies)`: from the positions and
 masses of all systems that take part, an array (3, n) [m/s2] for each of them; it may define
-`energy(p, bodies)`, their potential energy [J].
+`energy(p, bodies)`, their potential energy [J]. What happens at the end of a step, such as a
+collision or a thermostat, defines `exchange(p, movers, when)`, which changes velocities, and
+returns whether it moved anybody.
 
 A law of velocities defines `velocities(p, walkers, step)`: what the particles may do of what the
 forces want (`constrain.py`). A law of captures defines `captures(p, hunters, prey)`: which
@@ -53,7 +55,7 @@ KIND = Kind(
     "interact",
     "interaction",
     "scene",
-    ("accelerations", "force", "near", "velocities", "captures"),
+    ("accelerations", "force", "near", "exchange", "velocities", "captures"),
     _Common,
     {"force": _Near, "near": _Gathering},
 )
