@@ -35,10 +35,10 @@ from motes.jit import blocks, share, threads
 SINGLE_FROM = 4e-6
 """Smallest tolerance that single precision keeps."""
 
-LEAVES = 32
+LEAVES = 16
 """Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
-LEAVES_OF_A_CLASS = 8
+LEAVES_OF_A_CLASS = 4
 """Target leaves out of each further class, which has twice as many as the one before."""
 
 SAFETY = 0.7
@@ -76,7 +76,7 @@ def plan(tolerance: float, law: str) -> Plan:
     """Order, leaf size and precision that are fast at a tolerance, found by measurement."""
     digits = -math.log10(tolerance)
     real = np.float32 if tolerance >= SINGLE_FROM else np.float64
-    order = min(max(2, round(1.6 * digits)), HIGHEST[law != "plummer"])
+    order = min(max(2, int(1.2 * digits + 1.5)), HIGHEST[law != "plummer"])
     return Plan(order=order, leaf=32 if digits < 4 else 48, real=real)
 
 

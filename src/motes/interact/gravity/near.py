@@ -92,6 +92,9 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
     ) -> None:
         cells, bodies = sources.cells, sources.bodies
         source, target, spans = desk.source, desk.target, desk.spans
+        new_x, new_y, new_z, new_m = source[0], source[1], source[2], source[3]
+        near = sources.near
+        old_x, old_y, old_z, old_m = near[0], near[1], near[2], near[3]
         kind = source.dtype.type
         x, y, z = targets.bodies[cell, X], targets.bodies[cell, Y], targets.bodies[cell, Z]
         radius = targets.bodies[cell, RADIUS]
@@ -112,18 +115,20 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
                 continue
             dx, dy, dz = bodies[leaf, X] - x, bodies[leaf, Y] - y, bodies[leaf, Z] - z
             reach = np.sqrt(dx * dx + dy * dy + dz * dz) + bodies[leaf, RADIUS]
-            shifts = (kind(dx), kind(dy), kind(dz), kind(0))
+            sx = sy = sz = spread(kind(0))
+            if single:
+                sx, sy, sz = spread(kind(dx)), spread(kind(dy)), spread(kind(dz))
             while first < last:
                 taken = min(last - first, SOURCES - packed)
                 distance = max(distance, reach)
                 if itself:
                     own = (first - start, first - start + taken, packed - (first - start))
                 # The last lanes may hold more than this leaf; what follows overwrites them.
-                for row in range(4):
-                    old, new = sources.near[row], source[row]
-                    shift = spread(shifts[row] if single else kind(0))
-                    for i in range(0, taken, LANES):
-                        write(new, packed + i, read(old, first + i) + shift)
+                for i in range(0, taken, LANES):
+                    write(new_x, packed + i, read(old_x, first + i) + sx)
+                    write(new_y, packed + i, read(old_y, first + i) + sy)
+                    write(new_z, packed + i, read(old_z, first + i) + sz)
+                    write(new_m, packed + i, read(old_m, first + i))
                 spans[pieces, 0], spans[pieces, 1] = first, first + taken
                 pieces, packed, first = pieces + 1, packed + taken, first + taken
                 if packed == SOURCES:

@@ -19,14 +19,14 @@ from motes.jit import blocks, jit, share
 START, END, SKIP = 0, 1, 2
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
 
-FEW = 8
+FEW = 4
 """Most particles in leaves that are much larger than usual.
 
 Such a leaf has a side that is near to very many small cells, in all of which it would see particles
 only, and expansions around its center hardly converge at its edge.
 """
 
-FINER = 3
+FINER = 1
 """Levels from a usual leaf up to one that is much larger."""
 
 LIGHT = 1e-30

@@ -36,14 +36,17 @@ def _accepts(limits: Limits, allowed: Any, r2: Any, radii: Any, mass: Any, order
     r2 += limits.e2
     if not radii * radii < limits.opening2 * r2:
         return False
-    ratio2 = radii * radii / r2
-    estimate = mass
-    for _ in range(order // 2):
-        estimate *= ratio2
-    if order % 2 == 1:
-        estimate *= np.sqrt(ratio2)
-    rest = 1.0 - ratio2
-    return estimate <= allowed * r2 * (rest * rest)
+    # Squared and multiplied by R^(2p): a division or a root would take as long as all else.
+    square, rest = radii * radii, r2 - radii * radii
+    estimate, bound = mass * mass, allowed * allowed * r2
+    for _ in range(order):
+        estimate *= square
+    for _ in range(order - 3):
+        bound *= r2
+    bound *= rest * rest
+    if order < 3:
+        estimate *= r2
+    return estimate <= bound * (rest * rest)
 
 
 @cache
