@@ -103,7 +103,7 @@ def radial_distribution(
 def local_order(x: ArrayLike) -> NDArray[np.float64]:
     """How much the surroundings of points are those of a crystal, from 0 to 1, (n,).
 
-    max(0, 1 - 5 c), with c the centrosymmetry of the 12 nearest neighbours at r_k: the sum over the
+    max(0, 1 - 14 c), with c the centrosymmetry of the 12 nearest neighbours at r_k: the sum over the
     6 most opposite pairs of |r_i + r_j|^2, divided by 2 sum |r_k|^2. It is 1 inside a face-centred
     cubic crystal, and near 0 in a liquid and at a surface. `x`: (n, 3) points [m] in open space.
     Source: Kelchner, Plimpton and Hamilton, Physical Review B 58 (1998) 11085, equation 1.
@@ -121,7 +121,8 @@ def local_order(x: ArrayLike) -> NDArray[np.float64]:
         away = points[neighbours[rows]] - points[rows][:, None]
         sums = ((away[:, first] + away[:, second]) ** 2).sum(axis=2)
         six = np.sort(sums, axis=1)[:, :6].sum(axis=1)
-        order[rows] = np.maximum(0.0, 1 - 5 * six / (2 * (away**2).sum(axis=(1, 2))))
+        whole = 2 * (away**2).sum(axis=(1, 2))
+        order[rows] = np.maximum(0.0, 1 - 14 * six / whole)
     return order
 
 

@@ -220,11 +220,22 @@ class Stepper:
     def events(self) -> None:
         """Nothing listens to births, impacts and deaths yet; what will goes here."""
 
-    def deaths(self, rows: Particles, exceptional: NDArray[np.int64], interval: Interval) -> None:
-        """Take out the rows that a retirement claims; the straight pass has marked its own."""
-        if not self.system.motion.mortal or not rows.count:
+    def deaths(
+        self,
+        rows: Particles,
+        exceptional: NDArray[np.int64],
+        interval: Interval,
+        caught: NDArray[np.int64] = NOTHING,
+    ) -> None:
+        """Take out the rows that were caught, and those that a retirement claims; the straight pass
+        has marked its own.
+        """
+        mortal = self.system.motion.mortal
+        if not rows.count or not (mortal or caught.size):
             return
-        flags, parts = self._flags(rows), _parts(exceptional.size, 1)
+        flags, parts = self._flags(rows), _parts(exceptional.size if mortal else 0, 1)
+        if not mortal:
+            flags[: rows.count] = 0
 
         def retire(k: int) -> None:
             low, high = parts[k]
@@ -234,6 +245,7 @@ class Stepper:
             )  # fmt: skip
 
         share(retire, len(parts))
+        flags[caught] = 1
         rows.keep(flags)
 
     def _flags(self, rows: Particles) -> NDArray[np.uint8]:
