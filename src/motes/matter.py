@@ -105,8 +105,9 @@ def local_order(x: ArrayLike) -> NDArray[np.float64]:
 
     max(0, 1 - 14 c), with c the centrosymmetry of the 12 nearest neighbours at r_k: the sum over
     the 6 most opposite pairs of |r_i + r_j|^2, divided by 2 sum |r_k|^2. It is 1 inside a crystal
-    with cubic close packing, and near 0 in a liquid and at a surface. `x`: (n, 3) points [m] in open space.
-    Source: Kelchner, Plimpton and Hamilton, Physical Review B 58 (1998) 11085, equation 1.
+    with cubic close packing, and near 0 in a liquid and at a surface. `x`: (n, 3) points [m] in
+    open space. Source: Kelchner, Plimpton and Hamilton, Physical Review B 58 (1998) 11085,
+    equation 1.
     """
     from motes.neighbours import nearest
 
