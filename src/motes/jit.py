@@ -18,7 +18,7 @@ import pickle
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from functools import cache, update_wrapper
+from functools import cache, partial, update_wrapper
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +135,11 @@ class Kernel:
         from motes.machine.target import optimised
 
         return str(optimised(compiled_text(self, tuple(map(kind_of, arguments)))[0]))
+
+
+def bound(kernel: Callable[..., Any], *arguments: Any) -> Callable[..., Any]:
+    """`kernel` with its first arguments given; many calls then take them apart only once."""
+    return kernel.bind(*arguments) if isinstance(kernel, Kernel) else partial(kernel, *arguments)
 
 
 # ---------------------------------------------------------------------------- kernel cache

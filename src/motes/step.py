@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from motes.compile.system import CompiledSystem
 from motes.emission import Clock, Source
-from motes.jit import blocks, share
+from motes.jit import blocks, bound, share
 from motes.state import Particles
 
 LARGEST_BLOCK = 1 << 18
@@ -141,12 +141,14 @@ class Stepper:
         parts = _parts(last - first, 1)
         found = [NOTHING] * len(parts)
 
+        step = bound(
+            kernel, rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
+            interval.begin, interval.length,
+        )  # fmt: skip
+
         def straight(k: int) -> None:
             low, high = first + parts[k][0], first + parts[k][1]
-            kernel(
-                rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
-                interval.begin, interval.length, low, high,
-            )  # fmt: skip
+            step(low, high)
             if self.system.surfaces is not None:
                 found[k] = _marked(flags, low, high)
 
@@ -180,14 +182,11 @@ class Stepper:
         flags = self._flags(rows)
         parts = _parts(rows.count, 1)
 
-        def retire(k: int) -> None:
-            low, high = parts[k]
-            self.system.retire(
-                rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
-                interval.end, 0.0, low, high,
-            )  # fmt: skip
-
-        share(retire, len(parts))
+        retire = bound(
+            self.system.retire, rows.position, rows.velocity, rows.birth, rows.columns, flags,
+            self.system.K, interval.end, 0.0,
+        )  # fmt: skip
+        share(lambda k: retire(*parts[k]), len(parts))
         rows.keep(flags)
 
     def _flags(self, rows: Particles) -> NDArray[np.uint8]:

@@ -21,7 +21,6 @@ from motes.machine.types import (
     Unsupported,
     of_dtype,
 )
-from motes.machine.values import register_types
 
 _PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_char_p, ctypes.c_void_p)
 """Calls through it release the interpreter's lock."""
@@ -31,12 +30,8 @@ def spread(argument: Any, key: list[Any], numbers: list[Any]) -> None:
     """Append what an argument's type follows from, and its numbers."""
     kind = type(argument)
     if kind is np.ndarray:
-        packed = argument.flags.c_contiguous
-        key.append((argument.dtype.num, argument.ndim, packed))
-        numbers.append(argument.__array_interface__["data"][0])
-        numbers += argument.shape
-        if not packed:
-            numbers += argument.strides
+        key.append((argument.dtype.num, argument.ndim, argument.flags.c_contiguous))
+        numbers.append(id(argument))
     elif kind is tuple:
         key.append(len(argument))
         for item in argument:
@@ -81,7 +76,7 @@ def letters(kind: Type) -> str:
     if isinstance(kind, Tuple):
         return "".join(map(letters, kind.items))
     if isinstance(kind, Array):
-        return "Q" + "q" * (len(register_types(kind)) - 1)
+        return "Q"
     return ""
 
 

@@ -6,15 +6,21 @@ import types
 from collections.abc import Sequence
 from typing import Any
 
+from motes.machine.block import Writer
 from motes.machine.calls import plain_function
 from motes.machine.function import Function, returned
-from motes.machine.types import Number, Type, Unsupported
+from motes.machine.types import Array, Number, Tuple, Type, Unsupported
 from motes.machine.values import register_types
 
 ENTRY = "motes_entry"
 """Name of the function that Python calls: it reads arguments of 8 bytes each from memory."""
 
 PLAIN = "nounwind mustprogress"
+
+_WORD = 8
+_HEAD = object.__basicsize__
+FIELDS = {"data": _HEAD, "shape": _HEAD + 2 * _WORD, "strides": _HEAD + 3 * _WORD}
+"""Where NumPy's arrays (PyArrayObject_fields in its C interface) keep what a kernel needs."""
 
 
 class Module:
@@ -66,35 +72,60 @@ class Module:
 
 
 def door(name: str, result: Type, kinds: Sequence[Type]) -> str:
-    """A function of two addresses: the arguments, and where the result goes, 8 bytes a number."""
-    lines, passed, place = [], [], 0
-    for kind in kinds:
-        for llvm in register_types(kind):
-            at = f"%p{place}"
-            lines.append(f"{at} = getelementptr inbounds i64, ptr %from, i64 {place}")
-            wide = {"float": "double", "double": "double", "ptr": "ptr"}.get(llvm, "i64")
-            lines.append(f"%w{place} = load {wide}, ptr {at}")
-            if wide == llvm:
-                passed.append(f"{llvm} %w{place}")
-            else:
-                step = "fptrunc" if llvm == "float" else "trunc"
-                lines.append(f"%v{place} = {step} {wide} %w{place} to {llvm}")
-                passed.append(f"{llvm} %v{place}")
-            place += 1
+    """A function of two addresses: the arguments, and where the result goes, 8 bytes a number.
+
+    An array comes as the address of NumPy's object, which is read here.
+    """
+    writer = Writer(frozenset())
+    place = 0
+
+    def argument(llvm: str) -> str:
+        nonlocal place
+        at = writer.do(f"getelementptr inbounds i64, ptr %from, i64 {place}")
+        place += 1
+        return writer.do(f"load {llvm}, ptr {at}")
+
+    def taken(kind: Type) -> list[str]:
+        if isinstance(kind, Number):
+            wide = "double" if kind.kind == "f" else "i64"
+            number = argument(wide)
+            if wide != kind.llvm:
+                step = "fptrunc" if kind.kind == "f" else "trunc"
+                number = writer.do(f"{step} {wide} {number} to {kind.llvm}")
+            return [number]
+        if isinstance(kind, Tuple):
+            return [register for item in kind.items for register in taken(item)]
+        if not isinstance(kind, Array):
+            return []
+        thing = argument("ptr")
+        found = [writer.do(f"load ptr, ptr {field(thing, 'data')}")]
+        for name in ("shape",) if kind.packed else ("shape", "strides"):
+            numbers = writer.do(f"load ptr, ptr {field(thing, name)}")
+            for axis in range(kind.axes):
+                at = writer.do(f"getelementptr inbounds i64, ptr {numbers}, i64 {axis}")
+                found.append(writer.do(f"load i64, ptr {at}"))
+        return found
+
+    def field(thing: str, name: str) -> str:
+        return writer.do(f"getelementptr inbounds i8, ptr {thing}, i64 {FIELDS[name]}")
+
+    passed = [
+        f"{llvm} {register}"
+        for kind in kinds
+        for llvm, register in zip(register_types(kind), taken(kind), strict=True)
+    ]
     out = register_types(result)
     call = f"call {returned(result)} @{name}({', '.join(passed)})"
-    lines.append(f"%result = {call}" if out else call)
+    whole = writer.do(call) if out else writer.line(call)
     for k, llvm in enumerate(out):
-        value = "%result"
+        value = whole
         if len(out) > 1:
-            value = f"%r{k}"
-            lines.append(f"{value} = extractvalue {returned(result)} %result, {k}")
+            value = writer.do(f"extractvalue {returned(result)} {whole}, {k}")
         if llvm == "float":
-            lines.append(f"%x{k} = fpext float {value} to double")
-            value, llvm = f"%x{k}", "double"
-        lines.append(f"%o{k} = getelementptr inbounds i64, ptr %to, i64 {k}")
-        lines.append(f"store {llvm} {value}, ptr %o{k}")
-    body = "\n".join(lines)
+            value, llvm = writer.do(f"fpext float {value} to double"), "double"
+        at = writer.do(f"getelementptr inbounds i64, ptr %to, i64 {k}")
+        writer.line(f"store {llvm} {value}, ptr {at}")
+    body = "\n".join(writer.blocks[0].lines)
     return f"define void @{ENTRY}(ptr noalias %from, ptr noalias %to) {PLAIN} {{\n{body}\nret void\n}}"
 
 
