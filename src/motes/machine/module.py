@@ -50,8 +50,8 @@ class Module:
         self._functions[key] = None
         writer = Function(self, function, kinds, flags)
         name = f"{function.__name__}.{len(self._functions)}"
-        inline = "alwaysinline " if getattr(thing, "inline", True) else ""
-        self._texts.append(writer.text(name, f"{inline}{PLAIN}"))
+        inline = "alwaysinline" if getattr(thing, "inline", True) else "noinline"
+        self._texts.append(writer.text(name, f"{inline} {PLAIN}"))
         self._functions[key] = name, writer.result
         return name, writer.result
 

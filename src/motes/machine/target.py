@@ -13,7 +13,7 @@ from llvmlite import binding
 
 from motes.machine.module import ENTRY
 
-LEVEL = 3
+LEVEL = 2
 
 
 @cache
