@@ -6,8 +6,9 @@ momentum and order. Here each stage is evaluated for the whole group before the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,15 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.catalog import Component
+from motes.compile.pairs import Law
 from motes.compile.staged import combine
-from motes.errors import SceneError
+from motes.errors import SceneError, likely
+from motes.interact.arrange import Box
 from motes.jit import blocks, share
+from motes.nearby import Body, Lasting, Nearby
 from motes.state import Particles
 from motes.step import Interval, Stepper
 from motes.tableau import Explicit, Splitting
 
 BLOCK = 1 << 16
 """Rows of one kernel call."""
+
+Interactions = tuple[tuple[str, Component], ...]
 
 
 @dataclass(frozen=True)
@@ -44,7 +50,6 @@ class _Member:
     alive: int
     y: NDArray[Any]
     push: NDArray[Any]
-    mass: NDArray[Any]
 
     def store(self) -> None:
         """Write the state back into the particles' columns."""
@@ -57,6 +62,10 @@ class _Member:
         columns, parts = (self.rows.birth, self.rows.columns), blocks(self.alive, BLOCK)
         share(lambda k: kernel(self.y, *columns, self.push, *arguments, *parts[k]), len(parts))
 
+    def body(self, time: float) -> Body:
+        """The system as laws of limited reach see it."""
+        return Body(self.stepper, self.rows, self.alive, self.y[:3], self.y[3:], time)
+
     @property
     def K(self) -> Any:
         """What the system's kernels read."""
@@ -67,9 +76,18 @@ class Group:
     """Steps systems that interact."""
 
     def __init__(
-        self, steppers: dict[str, Stepper], interactions: tuple[tuple[str, Component], ...]
+        self,
+        steppers: dict[str, Stepper],
+        interactions: Interactions,
+        precision: str,
+        strict: bool,
+        periodic: Box,
     ) -> None:
-        self.steppers, self.interactions = steppers, interactions
+        self.steppers = steppers
+        self.interactions = tuple(pair for pair in interactions if _global(pair[1]))
+        self._local = tuple(pair for pair in interactions if not _global(pair[1]))
+        self._strict, self._periodic = strict, periodic
+        self.nearby = self._nearby(precision)
         motions = [stepper.system.motion for stepper in steppers.values()]
         self.method = motions[0].method
         who = f"systems {', '.join(steppers)} interact"
@@ -82,14 +100,32 @@ class Group:
                 f"{who}, and such systems do not bounce yet: write collides = false in the solids."
             )
 
-    def step(self, systems: dict[str, Particles], interval: Interval) -> None:
+    def _nearby(self, precision: str) -> Nearby:
+        laws = []
+        for address, part in self._local:
+            targets = _named(part, "systems", self.steppers)
+            sources = _named(part, "sources", targets)
+            laws.append((Law(address, part, precision, self._strict), targets, sources))
+        real = np.float32 if precision == "single" else np.float64
+        return Nearby(laws, real, self._periodic)
+
+    @cached_property
+    def _measured(self) -> Nearby:
+        """The laws of limited reach in double precision, to measure with."""
+        return self._nearby("double")
+
+    def step(self, systems: dict[str, Particles], interval: Interval, memory: Lasting) -> None:
         """Take all systems through one step, in place."""
         alive = {name: s.births(systems[name], interval) for name, s in self.steppers.items()}
+        kept = {name: (alive[name], systems[name].deaths) for name in alive}
+        if memory.kept != kept:
+            memory.kept, memory.push = kept, None
+        self.nearby.settle(self._bodies(systems, alive, interval.begin), memory)
         members = {name: self._member(name, systems[name], alive[name]) for name in alive}
         if isinstance(self.method, Splitting):
-            self._split(members, interval, self.method)
+            self._split(members, interval, self.method, memory)
         else:
-            self._runge_kutta(members, interval, self.method)
+            self._runge_kutta(members, interval, self.method, memory)
         for name, stepper in self.steppers.items():
             members[name].store()
             newborn = np.arange(alive[name], systems[name].count)
@@ -97,28 +133,38 @@ class Group:
             stepper.events()
             stepper.deaths(systems[name], interval)
 
+    def _bodies(
+        self, systems: dict[str, Particles], alive: dict[str, int], time: float
+    ) -> dict[str, Body]:
+        found = {}
+        for name, stepper in self.steppers.items():
+            rows, n = systems[name], alive[name]
+            found[name] = Body(stepper, rows, n, rows.position[:, :n], rows.velocity[:, :n], time)
+        return found
+
     def _member(self, name: str, rows: Particles, alive: int) -> _Member:
         y = np.concatenate([rows.position[:, :alive], rows.velocity[:, :alive]])
-        stepper = self.steppers[name]
-        push, mass = np.zeros((3, alive), rows.real), stepper.mass(rows, alive)
-        return _Member(stepper, rows, alive, y, push, mass)
+        return _Member(self.steppers[name], rows, alive, y, np.zeros((3, alive), rows.real))
 
-    def _split(self, members: dict[str, _Member], interval: Interval, method: Splitting) -> None:
+    def _split(
+        self, members: dict[str, _Member], interval: Interval, method: Splitting, memory: Lasting
+    ) -> None:
         h = interval.length
         for kick, drift, place in zip(
             method.kicks, (*method.drifts, 0.0), method.times, strict=True
         ):
-            time = interval.begin + place * h
+            time = _at(interval, place)
             if kick:
-                self._interact(members, time)
+                self._interact(members, time, memory)
                 for member in members.values():
                     member.each("kick", member.K, time, kick * h)
             if drift:
+                memory.push = None
                 for member in members.values():
                     member.each("drift", member.K, time, drift * h)
 
     def _runge_kutta(
-        self, members: dict[str, _Member], interval: Interval, method: Explicit
+        self, members: dict[str, _Member], interval: Interval, method: Explicit, memory: Lasting
     ) -> None:
         h, s = interval.length, method.stages
         bases = {name: m.y.copy() for name, m in members.items()}
@@ -130,23 +176,44 @@ class Group:
                 real = member.y.dtype.type
                 arguments = (bases[name], slopes[name], weights.astype(real), real(h), member.y)
                 share(lambda k, a=arguments, p=parts: combine(*a, *p[k]), len(parts))  # type: ignore[misc]
+            memory.push = None
             if i == s:
                 return
-            time = interval.begin + method.c[i] * h
-            self._interact(members, time)
+            time = _at(interval, method.c[i])
+            self._interact(members, time, memory)
             for name, member in members.items():
                 member.each("slope", slopes[name][i], member.K, time)
 
-    def _interact(self, members: dict[str, _Member], time: float) -> None:
-        """Fill every member's push with what the interactions give at a time."""
-        for member in members.values():
-            member.push[:] = 0
-        bodies = [Bodies(name, m.y[:3], m.mass) for name, m in members.items()]
-        for _, interaction in self.interactions:
-            chosen, p = _partners(interaction, bodies), _values(interaction, time)
-            pushes = _kernel(interaction, "accelerations")(p, chosen)
-            for body, push in zip(chosen, pushes, strict=True):
-                members[body.name].push += push
+    def _interact(self, members: dict[str, _Member], time: float, memory: Lasting) -> None:
+        """Give every member the push of the interactions at a time.
+
+        What was summed up last holds as long as nothing has moved: the end of one step of the
+        leapfrog is the begin of the next.
+        """
+        if memory.push is None or memory.time != time or self.nearby.depends_on_velocity:
+            memory.push = self._pushes(members, time, memory)
+            memory.time = time
+        for name, member in members.items():
+            member.push = memory.push[name]
+
+    def _pushes(
+        self, members: dict[str, _Member], time: float, memory: Lasting
+    ) -> dict[str, NDArray[Any]]:
+        pushes = {name: np.zeros((3, m.alive), m.y.dtype) for name, m in members.items()}
+        if self.interactions:
+            bodies = [
+                Bodies(name, m.y[:3], m.stepper.mass(m.rows, m.alive))
+                for name, m in members.items()
+            ]
+            for _, interaction in self.interactions:
+                chosen, p = _partners(interaction, bodies), _values(interaction, time)
+                found = _kernel(interaction, "accelerations")(p, chosen)
+                for body, push in zip(chosen, found, strict=True):
+                    pushes[body.name] += push
+        if self._local:
+            near = {name: member.body(time) for name, member in members.items()}
+            self.nearby.push(near, pushes, memory)
+        return pushes
 
     def energy(self, systems: dict[str, Particles], time: float) -> float:
         """Potential energy [J] of the interactions that define one."""
@@ -155,17 +222,48 @@ class Group:
             rows = systems[name]
             place = rows.position[:, : rows.count]
             bodies.append(Bodies(name, place, stepper.mass(rows, rows.count)))
-        return sum(
+        far = sum(
             float(_kernel(part, "energy")(_values(part, time), _partners(part, bodies)))
             for _, part in self.interactions
             if type(part).kernel("energy") is not None
         )
+        return far + (self._measured.energy(self._all(systems, time)) if self._local else 0.0)
+
+    def virial(self, systems: dict[str, Particles], time: float) -> NDArray[np.float64]:
+        """Sums r_i f_j over the pairs of pair laws: xx, yy, zz, xy, xz, yz (6,) [J]."""
+        if not self._local:
+            return np.zeros(6)
+        return self._measured.virial(self._all(systems, time))
+
+    def _all(self, systems: dict[str, Particles], time: float) -> dict[str, Body]:
+        return self._bodies(systems, {name: systems[name].count for name in self.steppers}, time)
+
+
+def _at(interval: Interval, share: float) -> float:
+    """A time within a step; its end is the next one's begin, to the last bit."""
+    return interval.end if share == 1.0 else interval.begin + share * interval.length
+
+
+def _global(interaction: Component) -> bool:
+    return type(interaction).kernel("accelerations") is not None
 
 
 def _kernel(interaction: Component, name: str) -> Callable[..., Any]:
     function = type(interaction).kernel(name)
     assert function is not None
     return function
+
+
+def _named(part: Component, key: str, known: Iterable[str]) -> tuple[str, ...]:
+    """The systems that an interaction names, or all that it could."""
+    named = part.values[key].document()
+    for name in named:
+        if name not in known:
+            raise SceneError(
+                f'interaction "{part.name}": {key} names "{name}", which does not take part in it.'
+                f"{likely(name, known)} There are: {', '.join(known)}."
+            )
+    return tuple(sorted(named or known))
 
 
 def _partners(interaction: Component, bodies: list[Bodies]) -> list[Bodies]:

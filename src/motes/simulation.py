@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from motes.appearance import Look
 from motes.catalog import Component, find
@@ -18,6 +19,9 @@ from motes.errors import SceneError, SimulationError, likely
 from motes.frame import Frame
 from motes.group import Group
 from motes.integrate import method
+from motes.interact.arrange import Box, wrapped
+from motes.nearby import Lasting
+from motes.philox import channel
 from motes.record.energy import Matter, Measures, measure
 from motes.scene.address import component_address
 from motes.scene.document import Scene, System
@@ -41,12 +45,15 @@ class Simulation:
         self._lead_in = round(scene.prewarm / scene.step)
         self.start = -self._lead_in * scene.step
         """Scene time at which the first step begins: 0 less the steps nearest to the prewarm."""
+        self._periodic = Box(
+            np.array(scene.periodic.low, float), np.array(scene.periodic.size, float)
+        )
         self._steppers = {s.name: self._stepper(s) for s in scene.systems}
         self._groups = self._grouped()
         self._looks = {s.name: Look(s) for s in scene.systems}
         self._systems = {s.name: s for s in scene.systems}
         real = np.float32 if scene.precision == "single" else np.float64
-        self._state = State(0, {})
+        self._state = State(0, {}, [Lasting() for _ in self._groups])
         for system in scene.systems:
             compiled = self._steppers[system.name].system
             widths = [(c.address, c.width) for c in compiled.columns]
@@ -112,6 +119,9 @@ class Simulation:
                     for part, link in zip(self.scene.interact, links, strict=True)
                     if link & group
                 ),
+                self.scene.precision,
+                self.scene.mode == "strict",
+                self._periodic,
             )
             for group in groups
         ]
@@ -167,6 +177,36 @@ class Simulation:
         potential += sum(group.energy(systems, self.time) for group in self._groups)
         return measure(self.time, matter, potential)
 
+    def virial(self) -> NDArray[np.float64]:
+        """Sums r_a f_b (3, 3) [J] over all pairs of the pair laws, now; W is its trace."""
+        xx, yy, zz, xy, xz, yz = sum(
+            (group.virial(self._state.systems, self.time) for group in self._groups), np.zeros(6)
+        )
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def listed_radius(self) -> float:
+        """Radius of the widest neighbour lists [m], 0 where no law has a reach."""
+        return max((group.nearby.radius(self.time) for group in self._groups), default=0.0)
+
+    def place(self, system: str, position: ArrayLike, velocity: ArrayLike = 0.0) -> None:
+        """Add particles at given places, now, to those that emitters make.
+
+        `position`: (n, 3) [m]. `velocity`: (n, 3), or one for all (3,) [m/s]. Raises SceneError if
+        there is no such system or its particles have values that are drawn at birth, ValueError for
+        arrays of other shapes.
+        """
+        self[system]
+        rows = self._state.systems[system]
+        if rows.widths:
+            drawn = ", ".join(address for address, _ in rows.widths)
+            raise SceneError(f'system "{system}": placed particles cannot draw {drawn}.')
+        x = np.asarray(position, float)
+        if x.ndim != 2 or x.shape[1] != 3:
+            raise ValueError(f"position must be (n, 3), not {x.shape}")
+        v = np.broadcast_to(np.asarray(velocity, float), x.shape)
+        rows.append(x.T, v.T, self.time, np.uint64(channel(f"{system}.place")))
+        wrapped(rows.position[:, : rows.count], self._periodic)
+
     def step(self) -> None:
         """Take one step."""
         self.run(steps=1)
@@ -214,8 +254,12 @@ class Simulation:
             self.work += state.systems[name].count
             if name not in grouped:
                 self._steppers[name].step(state.systems[name], interval)
-        for group in self._groups:
-            group.step(state.systems, interval)
+        for group, memory in zip(self._groups, state.memories, strict=True):
+            assert isinstance(memory, Lasting)
+            group.step(state.systems, interval, memory)
+        if self._periodic.size.any():
+            for particles in state.systems.values():
+                wrapped(particles.position[:, : particles.count], self._periodic)
         state.number += 1
 
     def _steps_before(self, time: float) -> int:

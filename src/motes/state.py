@@ -1,22 +1,23 @@
 """The state: everything that can change the next bit of a simulation, and nothing else.
 
 Columns are arrays of one number a particle, positions and velocities one (3, capacity) block each.
-Rows move only in `Particles.keep`. Births need no memory: the k-th birth of an emitter is a
-function of time.
+Rows move only in `Particles.keep` and `Particles.reorder`. Births need no memory: the
+k-th birth of an emitter is a function of time.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motes.jit import jit, share
 from motes.memory import allocate
+from motes.philox import hash_id
 
 SMALLEST = 1024
 """Rows that a system starts with."""
@@ -33,6 +34,8 @@ class Particles:
     widths: Sequence[tuple[str, int]]
     """Addresses and widths of the columns drawn at birth."""
     count: int = 0
+    deaths: int = 0
+    """How many have died so far; with the count it tells whether rows are still the same."""
     position: NDArray[Any] = field(init=False)
     velocity: NDArray[Any] = field(init=False)
     birth: NDArray[np.float64] = field(init=False)
@@ -76,6 +79,20 @@ class Particles:
         for before, after in zip(old, self.arrays(), strict=True):
             after[: self.count] = before[: self.count]
 
+    def append(
+        self, position: NDArray[Any], velocity: NDArray[Any], birth: float, address: np.uint64
+    ) -> None:
+        """Add rows (3, n), born at a time [s], whose ids hang on an address and their number."""
+        more, first = position.shape[1], self.count
+        self.reserve(more)
+        new = slice(first, first + more)
+        self.position[:, new] = position
+        if self.moves:
+            self.velocity[:, new] = velocity
+        self.birth[new] = birth
+        _name(address, first, self.ids[new])
+        self.count += more
+
     def keep(self, dead: NDArray[np.uint8]) -> int:
         """Close the gaps of the rows marked dead, in order; returns how many went."""
         first = int(np.argmax(dead[: self.count])) if self.count else 0
@@ -85,7 +102,17 @@ class Particles:
         share(lambda k: _compact(arrays[k], dead, first, self.count), len(arrays))
         gone = int(np.count_nonzero(dead[: self.count]))
         self.count -= gone
+        self.deaths += gone
         return gone
+
+    def reorder(self, order: NDArray[np.int32]) -> None:
+        """Move rows: row k becomes what row `order[k]` was, for the first of the rows."""
+        arrays = self.arrays()
+
+        def move(k: int) -> None:
+            arrays[k][: order.size] = arrays[k][order]
+
+        share(move, len(arrays))
 
     def first_not_finite(self) -> int | None:
         """The first row whose position or velocity is infinite or not a number, or None."""
@@ -109,16 +136,29 @@ class Particles:
         return twin
 
 
+class Memory(Protocol):
+    """What a group keeps: a copy shares arrays, which are replaced and never written to."""
+
+    def copy(self) -> Memory:
+        """An independent copy."""
+
+    def arrays(self) -> Iterator[NDArray[Any]]:
+        """Everything in it that can change the next bit."""
+
+
 @dataclass
 class State:
     """Step number and particles; the time is start + step * number, never a sum."""
 
     number: int
     systems: dict[str, Particles]
+    memories: list[Memory] = field(default_factory=list)
+    """What each group of systems that interact keeps from step to step."""
 
     def copy(self) -> State:
         """An independent copy."""
-        return State(self.number, {name: p.copy() for name, p in self.systems.items()})
+        systems = {name: p.copy() for name, p in self.systems.items()}
+        return State(self.number, systems, [memory.copy() for memory in self.memories])
 
     def digest(self) -> str:
         """One hash of the whole state, of 32 hexadecimal digits."""
@@ -127,7 +167,17 @@ class State:
             total.update(f"{name} {particles.count} {particles.widths}".encode())
             for array in particles.arrays():
                 total.update(np.ascontiguousarray(array[: particles.count]).data)
+        for memory in self.memories:
+            for array in memory.arrays():
+                total.update(np.ascontiguousarray(array).data)
         return total.hexdigest()
+
+
+@jit
+def _name(address, first, ids):  # type: ignore[no-untyped-def]
+    """Ids of births from a number on."""
+    for i in range(ids.size):
+        ids[i] = hash_id(address, np.uint64(first + i))
 
 
 @jit

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from motes.compile.system import CompiledSystem
 from motes.emission import Clock, Source
+from motes.errors import SceneError
 from motes.jit import blocks, bound, share
 from motes.state import Particles
 
@@ -72,13 +73,25 @@ class Stepper:
 
     def mass(self, rows: Particles, alive: int) -> NDArray[Any]:
         """Masses [kg] of the rows that were alive, (alive,)."""
-        address, control = self.system.motion.traits["mass"]
+        return self.trait("mass", rows, alive, 0.0)
+
+    def trait(self, name: str, rows: Particles, alive: int, time: float) -> NDArray[Any]:
+        """A trait of one number (mass, size, life) of the rows that were alive, (alive,)."""
+        if name not in self.system.motion.traits:
+            menu = ", ".join(self.system.motion.traits)
+            raise SceneError(f'system "{rows.name}" has no {name}. It has {menu}.')
+        address, control = self.system.motion.traits[name]
         start = 0
         for column in self.system.columns:
             if column.address == address:
                 return rows.columns[start][:alive]
             start += column.width
-        return np.full(alive, float(control.at(0.0)[0]), rows.real)
+        if control.scope == "scene":
+            return np.full(alive, float(control.at(time)[0]), rows.real)
+        raise SceneError(
+            f'system "{rows.name}": laws between particles need a {name} that does not run over '
+            "life or speed."
+        )
 
     def births(self, rows: Particles, interval: Interval) -> int:
         """Append the newborns of the step, as they are at their own instants.

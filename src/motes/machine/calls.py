@@ -169,6 +169,13 @@ class Calls(Memory):
             return literal(len(value.items), INT, bare=True)
         raise Unsupported("len of a number")
 
+    def numbered(self, value: Value) -> Value:
+        """enumerate, of a tuple."""
+        if not isinstance(value, Group):
+            raise Unsupported("enumerate of anything but a tuple")
+        pairs = enumerate(value.items)
+        return Group(tuple(Group((literal(k, INT, bare=True), item)) for k, item in pairs))
+
     def bits_as(self, value: Scalar, kind: Number) -> Scalar:
         """`value.view(type)`: the same bits as another type."""
         if value.type.bits != kind.bits:
@@ -240,6 +247,9 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     np.floor: _intrinsic("floor"),
     np.ceil: _intrinsic("ceil"),
     np.trunc: _intrinsic("trunc"),
+    np.round: _intrinsic("roundeven"),
+    np.rint: _intrinsic("roundeven"),
+    enumerate: Calls.numbered,
     math.fabs: _intrinsic("fabs"),
 }
 """Handlers by the function itself."""

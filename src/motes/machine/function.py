@@ -284,8 +284,8 @@ class Function(Calls):
 
     def _on_For(self, node: ast.For) -> None:
         call = node.iter
-        if node.orelse or not isinstance(node.target, ast.Name):
-            raise Unsupported("a loop runs over a range, with one name")
+        if node.orelse:
+            raise Unsupported("else after a loop")
         is_range = isinstance(call, ast.Call) and self._thing(call.func) is range
         if not is_range:
             group = self.value(node.iter)
@@ -310,7 +310,8 @@ class Function(Calls):
             self._written_out(node, items)
 
     def _ranged(self, node: ast.For, parts: Sequence[Scalar]) -> None:
-        assert isinstance(node.target, ast.Name)
+        if not isinstance(node.target, ast.Name):
+            raise Unsupported("a loop over a range has one name")
         target = node.target.id
         first, last, step = self._range(parts)
         counter = f"{target} of {node.lineno}:{node.col_offset}"

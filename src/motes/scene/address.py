@@ -46,7 +46,7 @@ def places(scene: Scene) -> Iterator[Place]:
     """All values of a scene."""
     for name in scene.parameters:
         yield Place(name, (name,), (name,))
-    for table in ("film", "camera", "sky"):
+    for table in ("film", "camera", "sky", "periodic"):
         for name in getattr(scene, table).parameters:
             yield Place(f"{table}.{name}", (table, name), (table, name))
     for kind in scene.lists:

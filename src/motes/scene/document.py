@@ -17,7 +17,7 @@ from motes.errors import Problem, SceneError
 from motes.scene import names
 from motes.scene.entry import Entry
 from motes.scene.section import Section, fault
-from motes.scene.sections import Camera, Film, Sky
+from motes.scene.sections import Camera, Film, Periodic, Sky
 
 Emitters = tuple[Annotated[Component, Entry("emit")], ...]
 Forces = tuple[Annotated[Component, Entry("force")], ...]
@@ -172,6 +172,9 @@ class Scene(Section):
     sky: Sky = Field(default_factory=Sky)
     """What is behind everything."""
 
+    periodic: Periodic = Field(default_factory=Periodic)
+    """A box that repeats, for matter without walls."""
+
     force: Forces = ()
     """Forces on every system."""
 
@@ -217,7 +220,7 @@ class Scene(Section):
     def document(self) -> dict[str, Any]:
         """The scene as plain data, the form of a scene file, without values equal to defaults."""
         entry = super().document()
-        for name in ("film", "camera", "sky"):
+        for name in ("film", "camera", "sky", "periodic"):
             if table := getattr(self, name).document():
                 entry[name] = table
         entry |= _lists(self, self.lists)

@@ -14,7 +14,7 @@ from motes.control.tables import MOST
 from motes.scene.document import Scene, System
 from motes.scene.names import WORD
 from motes.scene.section import Section
-from motes.scene.sections import Camera, Film, Sky
+from motes.scene.sections import Camera, Film, Periodic, Sky
 
 Schema = dict[str, Any]
 
@@ -35,6 +35,14 @@ _PLAIN: dict[str, Schema] = {
 _NAME: Schema = {"type": "string", "pattern": rf"^{WORD.pattern}$"}
 
 
+_SECTIONS: dict[str, type[Section]] = {
+    "film": Film,
+    "camera": Camera,
+    "sky": Sky,
+    "periodic": Periodic,
+}
+
+
 def schema() -> Schema:
     """JSON Schema (draft 2020-12) of a scene file, for editors that complete and check.
 
@@ -46,14 +54,14 @@ def schema() -> Schema:
         definitions |= _forms(shape)
     for kind in KINDS:
         definitions |= _kind(kind)
-    for name, model in (("film", Film), ("camera", Camera), ("sky", Sky)):
+    for name, model in _SECTIONS.items():
         definitions[name] = _section(model)
     definitions["system"] = _section(
         System,
         {"name": _NAME, "look": {"$ref": "#/$defs/look"}, **_lists(System.lists)},
         required=("name",),
     )
-    tables = {name: {"$ref": f"#/$defs/{name}"} for name in ("film", "camera", "sky")}
+    tables = {name: {"$ref": f"#/$defs/{name}"} for name in _SECTIONS}
     whole = _section(Scene, tables | _lists((*Scene.lists, "system")))
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
