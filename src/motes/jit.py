@@ -22,7 +22,7 @@ from functools import cache, partial, update_wrapper
 from pathlib import Path
 from typing import Any
 
-from motes.errors import OutputError
+from motes.errors import OutputError, SceneError
 from motes.files import written_whole
 
 FAST = frozenset({"reassoc", "contract", "arcp", "nsz"})
@@ -40,28 +40,35 @@ def jit(
     *,
     flags: frozenset[str] = FAST,
     inline: bool = False,
+    numba: bool = True,
 ) -> Any:
     """Compile a function to a serial kernel without the interpreter lock, kept in the kernel cache.
 
     `inline=True` is for functions called from kernels: they are inlined into every caller, which
-    is what lets a loop over them become SIMD, and cannot be called from Python. With the
-    environment variable NUMBA_DISABLE_JIT=1 functions stay what they are.
+    is what lets a loop over them become SIMD, and cannot be called from Python. With
+    `numba=False`, what is outside our compiler's language raises SceneError instead of going to
+    Numba. With the environment variable NUMBA_DISABLE_JIT=1 functions stay what they are.
     """
     if function is None:
-        return lambda f: jit(f, flags=flags, inline=inline)
+        return lambda f: jit(f, flags=flags, inline=inline, numba=numba)
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return function
-    return Kernel(function, flags, inline)
+    return Kernel(function, flags, inline, numba)
 
 
 class Kernel:
     """A function with machine code for each list of argument types that it was called with."""
 
     def __init__(
-        self, function: Callable[..., Any], flags: frozenset[str], inline: bool
+        self,
+        function: Callable[..., Any],
+        flags: frozenset[str] = FAST,
+        inline: bool = False,
+        numba: bool = True,
     ) -> None:
         update_wrapper(self, function)
         self.py_func, self.flags, self.inline = function, flags, inline
+        self._numba = numba
         self._doors: dict[tuple[Any, ...], Any] = {}
         self._lock = threading.Lock()
         self._dispatcher: Any = None
@@ -98,35 +105,47 @@ class Kernel:
         given: list[Any] = []
         for argument in arguments:
             spread(argument, head, given)
+        doors: dict[tuple[Any, ...], Any] = {}
 
         def bound(*rest: Any) -> Any:
-            key, numbers = head.copy(), given.copy()
+            key: list[Any] = []
+            numbers = given.copy()
             for argument in rest:
                 spread(argument, key, numbers)
-            door = self._doors.get(tuple(key)) or self._open(tuple(key), (*arguments, *rest))
+            door = doors.get(tuple(key))
+            if door is None:
+                whole = (*head, *key)
+                door = self._doors.get(whole) or self._open(whole, (*arguments, *rest))
+                doors[tuple(key)] = door
             return door(numbers) if door is not self else self.dispatcher(*arguments, *rest)
 
         return bound
 
     def _open(self, key: tuple[Any, ...], arguments: Sequence[Any]) -> Any:
         """The door for arguments of these types; the kernel itself where Numba must compile it."""
+        from motes.machine.door import kind_of
+        from motes.machine.kinds import Unsupported
+
+        name = self.py_func.__name__
         if self.inline:
             raise TypeError(
-                f"{self.py_func.__name__} is inlined into kernels and has no code that Python could "
-                f"call; {self.py_func.__name__}.py_func is the plain function"
+                f"{name} is inlined into kernels and has no code that Python could call; "
+                f"{name}.py_func is the plain function"
             )
-        from motes.machine.door import kind_of
-        from motes.machine.types import Unsupported
-
         with self._lock:
             if key not in self._doors:
                 try:
                     self._doors[key] = _made(self, tuple(map(kind_of, arguments)))
                 except Unsupported as fault:
+                    if not self._numba:
+                        raise SceneError(f"kernel {name}: {fault.whole()}") from fault
                     self._doors[key] = self
-                    if os.environ.get("MOTES_FALLBACK"):
-                        print("numba", self, fault, getattr(fault, "__notes__", ""))
             return self._doors[key]
+
+    @property
+    def foreign(self) -> bool:
+        """Whether Numba compiled it, for any types so far."""
+        return self in self._doors.values()
 
     def llvm(self, *arguments: Any) -> str:
         """LLVM's text of the optimised machine code for arguments like these."""
@@ -154,12 +173,10 @@ def _made(kernel: Kernel, kinds: tuple[Any, ...]) -> Any:
     """
     from motes.machine.door import Door
     from motes.machine.fingerprint import fingerprint
-    from motes.machine.target import identity, loaded, object_code
+    from motes.machine.target import identity, loaded
 
     name = kernel.py_func.__name__
-    text = repr(
-        (identity(), _compiler(), sorted(kernel.flags), kinds, fingerprint(kernel.py_func))
-    )
+    text = repr((identity(), _compiler(), sorted(kernel.flags), kinds, fingerprint(kernel.py_func)))
     path = cache_folder() / "kernels" / f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:32]}"
     kept = _kept(path)
     if kept is None:
@@ -294,5 +311,3 @@ def share(task: Callable[[int], Any], count: int) -> None:
 def blocks(rows: int, size: int) -> list[tuple[int, int]]:
     """Half-open ranges of at most `size` rows that cover `rows`."""
     return [(low, min(low + size, rows)) for low in range(0, rows, size)]
-
-

@@ -18,7 +18,6 @@ from typing import Any
 
 import llvmlite.binding
 import numba
-import numpy as np
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.registry import CPUDispatcher
 from numba.extending import typeof_impl
@@ -157,5 +156,3 @@ class _Impl(CompileResultCacheImpl):
         self._py_func = function
         self._lineno = function.__code__.co_firstlineno
         self._locator = types.SimpleNamespace(_py_file=function.__code__.co_filename)
-
-

@@ -109,7 +109,7 @@ class Text:
             "__name__": __name__,  # Cached machine code is rebuilt in an importable module.
             "F": self.real,
             "inline": lambda f: jit(f, flags=flags, inline=True),
-            "kernel": lambda f: jit(f, flags=flags),
+            "kernel": lambda f: jit(f, flags=flags, numba=False),
             "lookup": _lookup(self.real, flags),
             **self.translation.types,
             **self.records,

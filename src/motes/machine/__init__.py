@@ -1,7 +1,7 @@
 """From Python functions to machine code, through LLVM and nothing else.
 
 Kernels are scalar functions with loops around them. They need a fraction of what Python is, so that
-their compiler is small: `types` (numbers, tuples, arrays, and how they mix), `values` (what an
+their compiler is small: `kinds` (numbers, tuples, arrays, and how they mix), `values` (what an
 expression stands for while a function is compiled), `block` (LLVM's text, in static single
 assignment form), `expressions`, `calls` and `function` (one walk over the syntax tree, which finds
 types and writes the text at once), `target` (LLVM: optimisation, object code, loading), `door` (how

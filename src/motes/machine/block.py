@@ -6,7 +6,7 @@ import struct
 from dataclasses import dataclass, field
 from typing import Any
 
-from motes.machine.types import BOOL, INT, Array, Nothing, Number, Tuple, Type, Unsupported, joined
+from motes.machine.kinds import BOOL, INT, Array, Nothing, Number, Tuple, Type, Unsupported, joined
 from motes.machine.values import (
     Group,
     Known,

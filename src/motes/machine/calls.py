@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from motes.machine.block import literal
-from motes.machine.expressions import Memory
-from motes.machine.types import (
+from motes.machine.kinds import (
     BOOL,
     DOUBLE,
     INT,
@@ -21,6 +20,7 @@ from motes.machine.types import (
     Unsupported,
     of_dtype,
 )
+from motes.machine.memory import Memory
 from motes.machine.values import Group, Known, Scalar, Value, View, type_of
 
 ROOM = 1 << 14
@@ -182,9 +182,7 @@ class Calls(Memory):
             raise Unsupported(f"{value.type} and {kind} differ in size")
         if value.type.llvm == kind.llvm:
             return Scalar(kind, value.text)
-        return Scalar(
-            kind, self.do(f"bitcast {value.type.llvm} {value.text} to {kind.llvm}")
-        )
+        return Scalar(kind, self.do(f"bitcast {value.type.llvm} {value.text} to {kind.llvm}"))
 
     def empty(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
         """numpy.empty: room that the call has for itself; its numbers are not set."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from motes.machine.types import (
+from motes.machine.kinds import (
     BOOL,
     DOUBLE,
     INT,

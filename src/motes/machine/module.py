@@ -9,7 +9,7 @@ from typing import Any
 from motes.machine.block import Writer
 from motes.machine.calls import plain_function
 from motes.machine.function import Function, returned
-from motes.machine.types import Array, Number, Tuple, Type, Unsupported
+from motes.machine.kinds import Array, Number, Tuple, Type, Unsupported
 from motes.machine.values import register_types
 
 ENTRY = "motes_entry"
@@ -116,7 +116,11 @@ def door(name: str, result: Type, kinds: Sequence[Type]) -> str:
     ]
     out = register_types(result)
     call = f"call {returned(result)} @{name}({', '.join(passed)})"
-    whole = writer.do(call) if out else writer.line(call)
+    whole = ""
+    if out:
+        whole = writer.do(call)
+    else:
+        writer.line(call)
     for k, llvm in enumerate(out):
         value = whole
         if len(out) > 1:
@@ -126,7 +130,9 @@ def door(name: str, result: Type, kinds: Sequence[Type]) -> str:
         at = writer.do(f"getelementptr inbounds i64, ptr %to, i64 {k}")
         writer.line(f"store {llvm} {value}, ptr {at}")
     body = "\n".join(writer.blocks[0].lines)
-    return f"define void @{ENTRY}(ptr noalias %from, ptr noalias %to) {PLAIN} {{\n{body}\nret void\n}}"
+    return (
+        f"define void @{ENTRY}(ptr noalias %from, ptr noalias %to) {PLAIN} {{\n{body}\nret void\n}}"
+    )
 
 
 def compiled_text(kernel: Any, kinds: Sequence[Type]) -> tuple[str, Type]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from motes.machine.types import Unsupported
+from motes.machine.kinds import Unsupported
 
 CHEAP = (
     ast.Name, ast.Constant, ast.BinOp, ast.UnaryOp, ast.Compare, ast.operator, ast.unaryop,

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from motes.machine.types import NOTHING, Array, Number, Tuple, Type, Unsupported
+from motes.machine.kinds import NOTHING, Array, Number, Tuple, Type, Unsupported
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,13 @@ import numpy as np
 class Unsupported(Exception):
     """A function is outside what this compiler knows, or its types do not fit."""
 
+    place = ""
+    """Where in the source text, once that is known."""
+
+    def whole(self) -> str:
+        """What is wrong and where, on one line."""
+        return f"{self}: {self.place}" if self.place else str(self)
+
 
 class LiteralNeeded(Unsupported):
     """An index must be known while compiling: the loop around it can be written out."""
