@@ -9,8 +9,8 @@ from typing import Any
 from motes.machine.block import Writer
 from motes.machine.calls import plain_function
 from motes.machine.function import Function, returned
-from motes.machine.kinds import Array, Number, Tuple, Type, Unsupported
-from motes.machine.values import register_types
+from motes.machine.kinds import DOUBLE, INT, Array, Number, Tuple, Type, Unsupported
+from motes.machine.values import Scalar, register_types
 
 ENTRY = "motes_entry"
 """Name of the function that Python calls: it reads arguments of 8 bytes each from memory."""
@@ -121,18 +121,24 @@ def door(name: str, result: Type, kinds: Sequence[Type]) -> str:
         whole = writer.do(call)
     else:
         writer.line(call)
-    for k, llvm in enumerate(out):
+    for k, kind in enumerate(numbers_of(result)):
         value = whole
         if len(out) > 1:
             value = writer.do(f"extractvalue {returned(result)} {whole}, {k}")
-        if llvm == "float":
-            value, llvm = writer.do(f"fpext float {value} to double"), "double"
+        number = writer.cast(Scalar(kind, value), DOUBLE if kind.kind == "f" else INT)
         at = writer.do(f"getelementptr inbounds i64, ptr %to, i64 {k}")
-        writer.line(f"store {llvm} {value}, ptr {at}")
+        writer.line(f"store {number.type.llvm} {number.text}, ptr {at}")
     body = "\n".join(writer.blocks[0].lines)
     return (
         f"define void @{ENTRY}(ptr noalias %from, ptr noalias %to) {PLAIN} {{\n{body}\nret void\n}}"
     )
+
+
+def numbers_of(kind: Type) -> list[Number]:
+    """All numbers of a result, which holds no arrays."""
+    if isinstance(kind, Number):
+        return [kind]
+    return [n for item in kind.items for n in numbers_of(item)] if isinstance(kind, Tuple) else []
 
 
 def compiled_text(kernel: Any, kinds: Sequence[Type]) -> tuple[str, Type]:
