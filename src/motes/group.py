@@ -95,10 +95,6 @@ class Group:
             raise SceneError(f"{who} and must have one integrator.")
         if not all(motion.inertial for motion in motions):
             raise SceneError(f"{who} and must have velocities: give them a force besides flows.")
-        if any(stepper.system.surfaces for stepper in steppers.values()):
-            raise SceneError(
-                f"{who}, and such systems do not bounce yet: write collides = false in the solids."
-            )
 
     def _nearby(self, precision: str) -> Nearby:
         laws = []
@@ -127,11 +123,13 @@ class Group:
         else:
             self._runge_kutta(members, interval, self.method, memory)
         for name, stepper in self.steppers.items():
+            if stepper.rebounds(systems[name], members[name].y, alive[name], interval):
+                memory.push = None
             members[name].store()
             newborn = np.arange(alive[name], systems[name].count)
             stepper.exceptions(systems[name], newborn, interval)
             stepper.events()
-            stepper.deaths(systems[name], interval)
+            stepper.deaths(systems[name], np.arange(systems[name].count), interval)
 
     def _bodies(
         self, systems: dict[str, Particles], alive: dict[str, int], time: float

@@ -66,7 +66,7 @@ def thermo(sim: Simulation, boltzmann: float = 1.0) -> Thermo:
         temperature=2 * measures.kinetic / (max(freedom, 1) * boltzmann),
         potential=measures.potential / max(n, 1),
         total=measures.energy / max(n, 1),
-        pressure=(2 * measures.kinetic + virial) / (3 * np.prod(size)) if closed else float("nan"),
+        pressure=(2 * measures.kinetic + virial) / (3 * float(np.prod(size))) if closed else np.nan,
         virial=virial,
         pairs=pairs,
     )
@@ -110,7 +110,9 @@ def lj_melt(cells: int = 20, precision: str = "double") -> Simulation:
 
     Raises ValueError for less than 4 cells, which are too few for the cutoff. Source: the input
     `bench/in.lj` of LAMMPS (Thompson et al., Computer Physics Communications 271 (2022) 108171),
-    whose velocities are a function of the atoms' places.
+    whose velocities are a function of the atoms' places. Like it, the system builds its lists every
+    20 steps, and so misses some pairs: with `rebuild` = 0 the law does not, and the energy after
+    100 steps differs in the sixth digit.
     """
     from motes import Periodic, Scene, Simulation, System, interact
 
@@ -120,7 +122,7 @@ def lj_melt(cells: int = 20, precision: str = "double") -> Simulation:
     scene = Scene(
         title="Melt",
         systems=[System("atoms", size=0.5)],
-        interact=[interact.LennardJones(cutoff=2.5, skin=0.12)],
+        interact=[interact.LennardJones(cutoff=2.5, skin=0.12, rebuild=20)],
         periodic=Periodic(size=(spacing * cells,) * 3),
         step=0.005,
         integrator="leapfrog",
@@ -136,7 +138,8 @@ def _lattice(cells: int) -> NDArray[np.float64]:
     """Sites (4 cells^3, 3) of a face-centred cubic lattice of unit cells, along x first."""
     corner = np.stack(np.meshgrid(*[np.arange(cells)] * 3, indexing="ij"), axis=-1)[..., ::-1]
     basis = np.array([[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]])
-    return (corner.reshape(-1, 1, 3) + basis).reshape(-1, 3)
+    sites: NDArray[np.float64] = (corner.reshape(-1, 1, 3) + basis).reshape(-1, 3)
+    return sites
 
 
 def _velocities(x: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
@@ -164,4 +167,5 @@ def _velocities(x: NDArray[np.float64], temperature: float) -> NDArray[np.float6
         state = 16807 * state % modulus
         v[:, axis] = state / modulus - 0.5
     v -= v.mean(axis=0)
-    return v * np.sqrt(temperature * (3 * len(x) - 3) / (v**2).sum())
+    scaled: NDArray[np.float64] = v * np.sqrt(temperature * (3 * len(x) - 3) / (v**2).sum())
+    return scaled

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.compile.pairs import FORCE, POTENTIAL, VIRIAL, Law
+from motes.compile.pairs import FORCE, LISTED, POTENTIAL, VIRIAL, Law
 from motes.errors import SceneError, SimulationError
 from motes.interact.arrange import Arranged, Box, Packing, arrange, common_grid, wrapped
 from motes.interact.clusters import Part, lists
@@ -72,6 +72,8 @@ class Lists:
     """Lists by target and source."""
     kept: dict[str, tuple[int, int]]
     """Rows and deaths for which they hold."""
+    step: int = 0
+    """Number of the step in which they were built."""
     settled: bool = False
     """Whether rows are in the order of cells."""
 
@@ -87,6 +89,8 @@ class Lasting:
     kept: dict[str, tuple[int, int]] = field(default_factory=dict)
     builds: int = 0
     """How often lists were built."""
+    steps: int = 0
+    """How many steps were begun."""
 
     def copy(self) -> Lasting:
         """A copy that shares arrays, which are replaced and never written to."""
@@ -128,6 +132,12 @@ class Class:
         )
         return min(wanted, 0.999 * periodic.shortest)
 
+    def stale(self, found: Lists, moved: float, time: float, step: int) -> bool:
+        """Whether lists may miss a pair after particles have moved [m], or were to last shorter."""
+        if every := min(law.rebuild for law, _, _ in self.laws):
+            return step - found.step >= every or not np.isfinite(moved)
+        return not 2 * moved <= (found.radius - self.reach(time)) * CAUTION
+
 
 class Nearby:
     """Evaluates a group's laws of limited reach."""
@@ -143,7 +153,8 @@ class Nearby:
         self.classes: list[Class] = []
         for one in sorted(laws, key=lambda one: -one[0].reach(0.0)):
             first = self.classes[-1].laws[0][0] if self.classes else None
-            if first is None or first.reach(0.0) > ALIKE * one[0].reach(0.0):
+            alike = first is not None and first.rebuild == one[0].rebuild
+            if first is None or not alike or first.reach(0.0) > ALIKE * one[0].reach(0.0):
                 self.classes.append(Class([]))
             self.classes[-1].laws.append(one)
         self._room: dict[Any, NDArray[Any]] = {}
@@ -179,9 +190,10 @@ class Nearby:
         Lists that do not hold any more, since particles were born or have died, are built anew.
         """
         memory.lists = memory.lists or [None] * len(self.classes)
+        memory.steps += 1
         for k, shared in enumerate(self.classes):
             if not _holds(memory.lists[k], shared.systems, bodies):
-                self._build(k, bodies, memory)
+                self._build(k, bodies, memory, memory.steps - 1)
         moved: set[str] = set()
         for k, found in enumerate(memory.lists):
             if found is not None and not found.settled:
@@ -208,8 +220,8 @@ class Nearby:
         assert settled is not None
         memory.lists[k] = replace(settled, settled=True)
 
-    def _build(self, k: int, bodies: dict[str, Body], memory: Lasting) -> None:
-        memory.lists[k] = self.build(self.classes[k], bodies)
+    def _build(self, k: int, bodies: dict[str, Body], memory: Lasting, step: int) -> None:
+        memory.lists[k] = replace(self.build(self.classes[k], bodies), step=step)
         memory.builds += 1
 
     def build(self, shared: Class, bodies: dict[str, Body]) -> Lists:
@@ -246,8 +258,8 @@ class Nearby:
             moved = np.inf
             if found is not None and _holds(found, shared.systems, bodies):
                 packed, moved = self._packed(shared, found, bodies)
-            if found is None or not 2 * moved <= (found.radius - shared.reach(time)) * CAUTION:
-                self._build(k, bodies, memory)
+            if found is None or shared.stale(found, moved, time, memory.steps):
+                self._build(k, bodies, memory, memory.steps)
                 found = memory.lists[k]
                 assert found is not None
                 packed, _ = self._packed(shared, found, bodies)
@@ -274,7 +286,11 @@ class Nearby:
             position = self._space((name, "x"), (3, size))
             moved = max(moved, packing.positions(body.position, position))
             columns = dict(zip("xyz", position, strict=True))
-            for field_ in sorted(wanted[name] - set("xyz")):
+            for axis, then in enumerate(LISTED):
+                if then in wanted[name]:
+                    parts = found.arranged[name].real, found.arranged[name].ghosts
+                    columns[then] = np.concatenate([*(p.position[axis] for p in parts), [0]])
+            for field_ in sorted(wanted[name] - set(columns)):
                 columns[field_] = self._space((name, field_), (size,))
                 packing.values(body.column(field_), columns[field_])
             packed[name] = columns
@@ -299,7 +315,7 @@ class Nearby:
         own, other = law.fields
         mine = tuple(packed[target][name] for name in own)
         numbers = law.numbers(time, self.real)
-        limit = self.real(law.reach(time)) ** 2
+        limit, listed = self.real(law.reach(time)) ** 2, self.real(found.radius) ** 2
         kernel = law.sweep(what)
         for source in sources:
             theirs = tuple(packed[source][name] for name in other)
@@ -313,7 +329,10 @@ class Nearby:
                 room: NDArray[Any] = np.empty((len(other), longest), self.real)
                 best: NDArray[Any] = np.empty(max(law.nearest, 1), self.real)
                 pick = np.empty(max(law.nearest, 1), np.int64)
-                kernel(numbers, mine, theirs, *part, source == target, limit, room, best, pick, out)
+                kernel(
+                    numbers, mine, theirs, *part, source == target, limit, listed, room, best,
+                    pick, out,
+                )  # fmt: skip
 
             share(sweep, len(parts))
         return out

@@ -20,7 +20,11 @@ from motes.memory import allocate
 from motes.philox import hash_id
 
 SMALLEST = 1024
-"""Rows that a system starts with."""
+"""Rows that a system starts with, and a number of which all capacities are about a multiple."""
+
+SHIFT = 176
+"""Rows more than such a multiple. Columns a power of two apart would share the same few places of
+every cache, and the same banks of memory; with this shift a step is half again as fast."""
 
 
 @dataclass
@@ -45,7 +49,7 @@ class Particles:
     """Values drawn at birth, one array a component, in the order of `widths`."""
 
     def __post_init__(self) -> None:
-        self._allocate(SMALLEST)
+        self._allocate(_roomy(SMALLEST))
 
     @property
     def capacity(self) -> int:
@@ -54,8 +58,10 @@ class Particles:
 
     def _allocate(self, rows: int) -> None:
         what = f'system "{self.name}" with {rows} rows'
-        self.position = allocate((3, rows), self.real, what)
-        self.velocity = allocate((3, rows if self.moves else 0), self.real, what)
+        motion = allocate((6 if self.moves else 3, rows), self.real, what)
+        self.position, self.velocity = motion[:3], motion[3:]
+        if not self.moves:
+            self.velocity = np.zeros((3, 0), self.real)
         self.birth = allocate((rows,), np.float64, what)
         self.ids = allocate((rows,), np.uint64, what)
         width = sum(w for _, w in self.widths)
@@ -71,9 +77,7 @@ class Particles:
         """Make room for more rows; capacity doubles, and what is alive is copied."""
         if self.count + more <= self.capacity:
             return
-        rows = self.capacity
-        while rows < self.count + more:
-            rows *= 2
+        rows = _roomy(max(2 * self.capacity, self.count + more))
         old = self.arrays()
         self._allocate(rows)
         for before, after in zip(old, self.arrays(), strict=True):
@@ -95,7 +99,7 @@ class Particles:
 
     def keep(self, dead: NDArray[np.uint8]) -> int:
         """Close the gaps of the rows marked dead, in order; returns how many went."""
-        first = int(np.argmax(dead[: self.count])) if self.count else 0
+        first = int(np.argmax(dead[: self.count].view(bool))) if self.count else 0
         if self.count == 0 or not dead[first]:
             return 0
         arrays = self.arrays()
@@ -130,7 +134,7 @@ class Particles:
         """An independent copy of the rows that are alive, with room for births."""
         twin = object.__new__(Particles)
         twin.__dict__.update(self.__dict__)
-        twin._allocate(max(SMALLEST, self.count + self.count // 8))
+        twin._allocate(_roomy(self.count + self.count // 8))
         for mine, theirs in zip(self.arrays(), twin.arrays(), strict=True):
             theirs[: self.count] = mine[: self.count]
         return twin
@@ -171,6 +175,11 @@ class State:
             for array in memory.arrays():
                 total.update(np.ascontiguousarray(array).data)
         return total.hexdigest()
+
+
+def _roomy(rows: int) -> int:
+    """A capacity of at least so many rows."""
+    return -(-rows // SMALLEST) * SMALLEST + SHIFT
 
 
 @jit

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motes.compile.straight import THREATENED
 from motes.compile.system import CompiledSystem
 from motes.emission import Clock, Source
 from motes.errors import SceneError
@@ -63,13 +64,12 @@ class Stepper:
     def step(self, rows: Particles, interval: Interval) -> None:
         """Take the system through one step, in place."""
         alive = self.births(rows, interval)
-        exceptional = [
-            self.integrate(rows, alive, interval),
-            self.newborns(rows, alive, interval),
-        ]
-        self.exceptions(rows, np.concatenate(exceptional), interval)
+        exceptional = np.concatenate(
+            [self.integrate(rows, alive, interval), self.newborns(rows, alive, interval)]
+        )
+        self.exceptions(rows, exceptional, interval)
         self.events()
-        self.deaths(rows, interval)
+        self.deaths(rows, exceptional, interval)
 
     def mass(self, rows: Particles, alive: int) -> NDArray[Any]:
         """Masses [kg] of the rows that were alive, (alive,)."""
@@ -156,7 +156,7 @@ class Stepper:
 
         step = bound(
             kernel, rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
-            interval.begin, interval.length,
+            interval.begin, interval.end,
         )  # fmt: skip
 
         def straight(k: int) -> None:
@@ -185,21 +185,57 @@ class Stepper:
         share(care, len(parts))
         self.impacts += sum(impacts)
 
+    def rebounds(self, rows: Particles, ends: NDArray[Any], alive: int, interval: Interval) -> bool:
+        """Take a group's flight, which leads to `ends` (6, alive), through its impacts.
+
+        Returns whether any row ends elsewhere.
+        """
+        if self.system.surfaces is None:
+            return False
+        threats, flags, parts = self.system.staged("threats"), self._flags(rows), _parts(alive, 1)
+        found = [NOTHING] * len(parts)
+
+        def threaten(k: int) -> None:
+            low, high = parts[k]
+            threats(
+                rows.position, rows.velocity, ends, flags, self.system.K_staged, interval.begin,
+                interval.end, low, high,
+            )  # fmt: skip
+            found[k] = _marked(flags, low, high)
+
+        share(threaten, len(parts))
+        threatened = np.concatenate([NOTHING, *found])
+        parts = _parts(threatened.size, 64)
+        counts = [(0, 0)] * len(parts)
+
+        def care(k: int) -> None:
+            low, high = parts[k]
+            counts[k] = self.system.rebounds(
+                rows.position, rows.velocity, ends, rows.birth, rows.columns, threatened[low:high],
+                self.system.K_exact, self.system.K_solid, interval.begin, interval.length,
+            )  # fmt: skip
+
+        share(care, len(parts))
+        self.impacts += sum(hits for hits, _ in counts)
+        return any(changed for _, changed in counts)
+
     def events(self) -> None:
         """Nothing listens to births, impacts and deaths yet; what will goes here."""
 
-    def deaths(self, rows: Particles, interval: Interval) -> None:
-        """Take out the rows that a retirement claims."""
+    def deaths(self, rows: Particles, exceptional: NDArray[np.int64], interval: Interval) -> None:
+        """Take out the rows that a retirement claims; the straight pass has marked its own."""
         if not self.system.motion.mortal or not rows.count:
             return
-        flags = self._flags(rows)
-        parts = _parts(rows.count, 1)
+        flags, parts = self._flags(rows), _parts(exceptional.size, 1)
 
-        retire = bound(
-            self.system.retire, rows.position, rows.velocity, rows.birth, rows.columns, flags,
-            self.system.K, interval.end, 0.0,
-        )  # fmt: skip
-        share(lambda k: retire(*parts[k]), len(parts))
+        def retire(k: int) -> None:
+            low, high = parts[k]
+            self.system.retire(
+                rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
+                interval.end, exceptional[low:high],
+            )  # fmt: skip
+
+        share(retire, len(parts))
         rows.keep(flags)
 
     def _flags(self, rows: Particles) -> NDArray[np.uint8]:
@@ -219,9 +255,9 @@ def _parts(rows: int, cost: int) -> list[tuple[int, int]]:
 
 
 def _marked(flags: NDArray[np.uint8], low: int, high: int) -> NDArray[np.int64]:
-    """Rows from `low` to `high` whose flag is set: few, as a rule."""
+    """Rows from `low` to `high` that may meet a solid: few, as a rule."""
     words = np.flatnonzero(flags[low : low - (low - high) // WORD * WORD].view(np.uint64))
     near = (low + words[:, np.newaxis] * WORD + np.arange(WORD)).ravel()
-    near = near[flags[near] != 0]
+    near = near[flags[near] & THREATENED != 0]
     marked: NDArray[np.int64] = near[: np.searchsorted(near, high)]
     return marked

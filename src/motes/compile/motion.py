@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+
+import numpy as np
 
 from motes.catalog import Component
 from motes.compile.text import AXES, STATE, Call, Text, packed
@@ -185,6 +188,9 @@ class _Writer:
 
     def explicit(self, method: Explicit) -> None:
         """`advance` from a Butcher tableau."""
+        if self.motion.inertial and not self.motion.flows:
+            self._nystrom(method)
+            return
         lines = ""
         slope = "k" if self.motion.inertial else "u"
         for i, row in enumerate(method.a):
@@ -203,6 +209,28 @@ class _Writer:
         else:
             ends += ["vx", "vy", "vz"]
         self._advance(method, lines, ends)
+
+    def _nystrom(self, method: Explicit) -> None:
+        """The same table where x' = v, with the velocities of its stages put in.
+
+        x_i = x + c_i h v + h^2 sum_j (A A)_ij a_j and v_i = v + h sum_j A_ij a_j: fewer sums, and
+        less that a SIMD loop must keep at hand. (Hairer, Norsett, Wanner I, section II.14.)
+        """
+        full = [[*row, *(0.0,) * (method.stages - len(row))] for row in method.a]
+        table = np.array([*full, method.b])
+        places, squares = (*method.c, 1.0), table @ table[:-1]
+        lines, stages = "    h2 = h * h\n", []
+        for place, row, square in zip(places, table, squares, strict=True):
+            start = [f"{a} + F({float(place)!r}) * h * v{a}" if place else a for a in AXES]
+            state = [_sum(s, square, "h2", a) for s, a in zip(start, AXES, strict=True)] + [
+                _sum(f"v{a}", row, "h", a) for a in AXES
+            ]
+            stages.append(state)
+        for i, state in enumerate(stages[:-1]):
+            names = tuple(f"{n}_{i}" for n in STATE)
+            lines += "".join(f"    {n} = {e}\n" for n, e in zip(names, state, strict=True))
+            lines += self._slopes(i, names, method.c[i])
+        self._advance(method, lines, stages[-1])
 
     def splitting(self, method: Splitting) -> None:
         """`advance` as kicks and drifts; relaxations are exact, so that no step explodes."""
@@ -266,6 +294,12 @@ class _Writer:
             f"@inline\ndef dies({', '.join(STATE)}, age, C, S, L, t):\n{self._preamble()}"
             f"    return {' | '.join(f'({c})' for c in calls)}\n"
         )
+
+
+def _sum(start: str, weights: Sequence[float], scale: str, axis: str) -> str:
+    """`start + (w_0 scale) a_0 + (w_1 scale) a_1 ...` without the zero terms."""
+    terms = [f"F({float(w)!r}) * {scale} * a{axis}{j}" for j, w in enumerate(weights) if w != 0]
+    return " + ".join([start, *terms])
 
 
 def _combine(start: str, weights: tuple[float, ...], slope: str, axis: str) -> str:

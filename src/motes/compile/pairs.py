@@ -28,6 +28,11 @@ FORCE, POTENTIAL, VIRIAL = "force", "potential", "virial"
 """What a pair law's loops sum up besides what a gathering law's do, `near`."""
 
 
+LISTED = ("x0", "y0", "z0")
+"""Where a particle was when the lists were built: for lists that are to hold exactly the pairs
+within their radius, though they are not built as soon as they miss one."""
+
+
 class Law:
     """A law of limited reach: its kernels, and its numbers at a time."""
 
@@ -38,6 +43,7 @@ class Law:
         self.summed = FORCE if self.pairwise else "near"
         nearest = part.values["nearest"].document() if "nearest" in part.values else 0
         self.nearest = int(nearest)
+        self.rebuild = int(part.values["rebuild"].document())
         self.owner = f'interaction "{part.name}"'
         self._missing()
 
@@ -104,6 +110,9 @@ class Law:
             own.add("mass")
         else:
             own |= self._read(self._kernel("acceleration"), 1)
+        if self.rebuild:
+            own |= set(LISTED)
+            other |= set(LISTED)
         return _in_order(own), _in_order(other)
 
     @property
@@ -209,8 +218,8 @@ class _Writer:
         own, other, sums = self.own, self.other, range(width)
         lines = (
             f"@kernel\ndef sweep_{what}(numbers, targets, sources, cluster, first, entry, itself, "
-            "limit, room, best, pick, out):\n"
-            f"    p = {self._p()}\n"
+            "limit, listed, room, best, pick, out):\n"
+            f"    p = {self._p()}\n    quarter = F(0.25) * limit\n"
         )
         lines += "".join(f"    t_{n} = targets[{i}]\n" for i, n in enumerate(own))
         lines += "".join(f"    s_{n} = sources[{i}]\n" for i, n in enumerate(other))
@@ -238,8 +247,17 @@ class _Writer:
             lines += "            for q in range(slot.size):\n"
             lines += "".join(f"                b_{n} = q_{n}[q]\n" for n in other)
             lines += f"{loaded}                near = (square <= limit) & (slot[q] != me)\n"
+            if self.law.rebuild:
+                for n in LISTED:
+                    lines += f"                d_{n} = a_{n} - b_{n}\n"
+                square = " + ".join(f"d_{n} * d_{n}" for n in LISTED)
+                lines += f"                near &= ({square}) <= listed\n"
+            # Who does not count is taken at half of the reach, where laws are finite, and times 0:
+            # a choice of the summand itself would not become vector instructions.
+            lines += "                square = square if near else quarter\n"
+            lines += "                w = F(1.0) if near else F(0.0)\n"
             lines += f"                {term}"
-            lines += "".join(f"                sum{k} += n{k} if near else F(0.0)\n" for k in sums)
+            lines += "".join(f"                sum{k} += n{k} * w\n" for k in sums)
         lines += "".join(f"            out[{k}, i] += sum{k}\n" for k in sums)
         self.text.add(lines)
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 from motes.compile.motion import Motion
+from motes.compile.straight import THREATENED
+from motes.compile.surfaces import Surfaces
 from motes.compile.text import AXES, STATE, Text
 from motes.jit import jit
 from motes.tableau import Splitting
@@ -46,6 +48,24 @@ def write_staged(text: Text, motion: Motion) -> None:
     )
     head = "@kernel\ndef slope(Y, birth, columns, push, slope_, K, t, lo, hi):\n"
     text.add(head + slices + outputs + begin + flows + pushed + change)
+
+
+def write_threats(text: Text, surfaces: Surfaces) -> None:
+    """Write `threats`, which flags rows that may meet a solid on the way from a state to Y."""
+    slices = "".join(
+        f"    {n}, n{n} = {'velocity' if n.startswith('v') else 'position'}[{k % 3}][lo:hi], "
+        f"Y[{k}][lo:hi]\n"
+        for k, n in enumerate(STATE)
+    )
+    row, ends = (", ".join(f"{m}{n}[i]" for n in STATE) for m in ("", "n"))
+    moved = "D0, solids(scene(K, end))" if surfaces.moving else "D0, D0"
+    text.add(
+        "@kernel\ndef threats(position, velocity, Y, flags, K, t, end, lo, hi):\n"
+        f"{slices}    D0 = solids(scene(K, t))\n    D0, D1 = {moved}\n"
+        "    flag, h = flags[lo:hi], F(end - t)\n    for i in range(x.size):\n"
+        f"        flag[i] = uint8({THREATENED}) if threatened(D0, D1, {row}, {ends}, h) "
+        "else uint8(0)\n"
+    )
 
 
 def _drift(motion: Motion, flows: str, row: str) -> str:

@@ -34,6 +34,10 @@ class _Near(_Common):
     skin: Number = quantity(0.1, "", at_least=0, at_most=1, scope="scene")
     """Margin of neighbour lists as a share of the reach: wider lists are longer and last longer."""
 
+    rebuild: int = quantity(0, at_least=0, at_most=1_000_000)
+    """Steps between builds of lists; 0 builds them before a pair could be missed, others may miss
+    some."""
+
 
 class _Gathering(_Near):
     nearest: int = quantity(0, at_least=0, at_most=1000)
