@@ -26,7 +26,7 @@ from motes.state import Particles
 from motes.step import Interval, Stepper
 from motes.tableau import Explicit, Splitting
 
-BLOCK = 1 << 16
+BLOCK = 1 << 14
 """Rows of one kernel call."""
 
 Interactions = tuple[tuple[str, Component], ...]
@@ -41,20 +41,43 @@ class Bodies:
     mass: NDArray[Any]
 
 
+@dataclass(frozen=True)
+class Movers:
+    """What an exchange sees of one system and may change: its rows' positions and velocities."""
+
+    name: str
+    position: NDArray[Any]
+    """(3, n) [m]"""
+    velocity: NDArray[Any]
+    """(3, n) [m/s]"""
+    mass: NDArray[Any]
+    """(n,) [kg]"""
+    size: NDArray[Any]
+    """(n,) diameters [m]"""
+    ids: NDArray[np.uint64]
+
+
+@dataclass(frozen=True)
+class Occasion:
+    """When an exchange happens: at the end of a step of a length [s], in a box, at an address."""
+
+    length: float
+    step: int
+    address: str
+    seed: int
+    periodic: Box
+
+
 @dataclass
 class _Member:
-    """One system of the group during a step: state y (6, n), push (3, n) and mass (n,)."""
+    """One system of the group during a step: state y (6, capacity) and push (3, n)."""
 
     stepper: Stepper
     rows: Particles
     alive: int
     y: NDArray[Any]
+    """The particles' own positions and velocities, or a copy where a flight has to be kept."""
     push: NDArray[Any]
-
-    def store(self) -> None:
-        """Write the state back into the particles' columns."""
-        self.rows.position[:, : self.alive] = self.y[:3]
-        self.rows.velocity[:, : self.alive] = self.y[3:]
 
     def each(self, name: str, *arguments: Any) -> None:
         """Run one of the system's staged kernels over all rows that were alive."""
@@ -64,7 +87,8 @@ class _Member:
 
     def body(self, time: float) -> Body:
         """The system as laws of limited reach see it."""
-        return Body(self.stepper, self.rows, self.alive, self.y[:3], self.y[3:], time)
+        x, v = self.y[:3, : self.alive], self.y[3:, : self.alive]
+        return Body(self.stepper, self.rows, self.alive, x, v, time)
 
     @property
     def K(self) -> Any:
@@ -84,8 +108,11 @@ class Group:
         periodic: Box,
     ) -> None:
         self.steppers = steppers
-        self.interactions = tuple(pair for pair in interactions if _global(pair[1]))
-        self._local = tuple(pair for pair in interactions if not _global(pair[1]))
+        self.interactions = _having(interactions, "accelerations")
+        self.exchanges = _having(interactions, "exchange")
+        self._local = tuple(
+            pair for pair in interactions if pair not in (*self.interactions, *self.exchanges)
+        )
         self._strict, self._periodic = strict, periodic
         self.nearby = self._nearby(precision)
         motions = [stepper.system.motion for stepper in steppers.values()]
@@ -123,9 +150,13 @@ class Group:
         else:
             self._runge_kutta(members, interval, self.method, memory)
         for name, stepper in self.steppers.items():
-            if stepper.rebounds(systems[name], members[name].y, alive[name], interval):
-                memory.push = None
-            members[name].store()
+            if stepper.system.surfaces is not None:
+                if stepper.rebounds(systems[name], members[name].y, alive[name], interval):
+                    memory.push = None
+                systems[name].motion[:, : alive[name]] = members[name].y
+        for address, part in self.exchanges:
+            self._exchange(address, part, members, interval, memory)
+        for name, stepper in self.steppers.items():
             newborn = np.arange(alive[name], systems[name].count)
             stepper.exceptions(systems[name], newborn, interval)
             stepper.events()
@@ -141,8 +172,9 @@ class Group:
         return found
 
     def _member(self, name: str, rows: Particles, alive: int) -> _Member:
-        y = np.concatenate([rows.position[:, :alive], rows.velocity[:, :alive]])
-        return _Member(self.steppers[name], rows, alive, y, np.zeros((3, alive), rows.real))
+        stepper = self.steppers[name]
+        y = rows.motion if stepper.system.surfaces is None else rows.motion[:, :alive].copy()
+        return _Member(stepper, rows, alive, y, np.zeros((3, 0), rows.real))
 
     def _split(
         self, members: dict[str, _Member], interval: Interval, method: Splitting, memory: Lasting
@@ -165,8 +197,8 @@ class Group:
         self, members: dict[str, _Member], interval: Interval, method: Explicit, memory: Lasting
     ) -> None:
         h, s = interval.length, method.stages
-        bases = {name: m.y.copy() for name, m in members.items()}
-        slopes = {name: np.zeros((s, *m.y.shape), m.y.dtype) for name, m in members.items()}
+        bases = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
+        slopes = {name: np.zeros((s, 6, m.alive), m.y.dtype) for name, m in members.items()}
         for i, row in enumerate((*method.a, method.b)):
             weights = np.array(row, float)
             for name, member in members.items():
@@ -200,7 +232,9 @@ class Group:
         pushes = {name: np.zeros((3, m.alive), m.y.dtype) for name, m in members.items()}
         if self.interactions:
             bodies = [
-                Bodies(name, m.y[:3], m.stepper.mass(m.rows, m.alive))
+                Bodies(
+                    name, np.ascontiguousarray(m.y[:3, : m.alive]), m.stepper.mass(m.rows, m.alive)
+                )
                 for name, m in members.items()
             ]
             for _, interaction in self.interactions:
@@ -212,6 +246,28 @@ class Group:
             near = {name: member.body(time) for name, member in members.items()}
             self.nearby.push(near, pushes, memory)
         return pushes
+
+    def _exchange(
+        self,
+        address: str,
+        part: Component,
+        members: dict[str, _Member],
+        interval: Interval,
+        memory: Lasting,
+    ) -> None:
+        """Let particles exchange motion at a step's end."""
+        p, chosen = _values(part, interval.end), _named(part, "systems", members)
+        movers, seed = [], 0
+        for name in chosen:
+            member = members[name]
+            rows, n, stepper = member.rows, member.alive, member.stepper
+            mass, seed = stepper.mass(rows, n), int(stepper.seed)
+            size = stepper.trait("size", rows, n, interval.end)
+            x, v = rows.position[:, :n], rows.velocity[:, :n]
+            movers.append(Movers(name, x, v, mass, size, rows.ids[:n]))
+        when = Occasion(interval.length, memory.steps, address, seed, self._periodic)
+        if _kernel(part, "exchange")(p, movers, when):
+            memory.push = None
 
     def energy(self, systems: dict[str, Particles], time: float) -> float:
         """Potential energy [J] of the interactions that define one."""
@@ -242,8 +298,8 @@ def _at(interval: Interval, share: float) -> float:
     return interval.end if share == 1.0 else interval.begin + share * interval.length
 
 
-def _global(interaction: Component) -> bool:
-    return type(interaction).kernel("accelerations") is not None
+def _having(interactions: Interactions, kernel: str) -> Interactions:
+    return tuple(pair for pair in interactions if type(pair[1]).kernel(kernel) is not None)
 
 
 def _kernel(interaction: Component, name: str) -> Callable[..., Any]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.compile.pairs import FORCE, LISTED, POTENTIAL, VIRIAL, Law
+from motes.control.curve import Curve
 from motes.errors import SceneError, SimulationError
 from motes.interact.arrange import Arranged, Box, Packing, arrange, common_grid, wrapped
 from motes.interact.clusters import Part, lists
@@ -28,7 +29,7 @@ ALIKE = 1.5
 CAUTION = 1 - 2.0**-10
 """Share of the allowed way after which a list is stale: more than rounding takes away."""
 
-ROWS = 1 << 15
+ROWS = 1 << 14
 """Rows of one task of a loop that is quick."""
 
 
@@ -53,6 +54,11 @@ class Body:
         """Masses (n,) [kg]."""
         return self.stepper.mass(self.rows, self.alive)
 
+    def lasts(self, name: str) -> bool:
+        """Whether a number of every particle never changes."""
+        traits = self.stepper.system.motion.traits
+        return name in traits and not isinstance(traits[name][1], Curve)
+
     def column(self, name: str) -> NDArray[Any]:
         """A number of every particle: v and an axis, or a trait."""
         if name in ("vx", "vy", "vz"):
@@ -74,6 +80,8 @@ class Lists:
     """Rows and deaths for which they hold."""
     step: int = 0
     """Number of the step in which they were built."""
+    columns: dict[tuple[str, str], NDArray[Any]] = field(default_factory=dict)
+    """What does not change while they hold, by system and name, in the order of slots."""
     settled: bool = False
     """Whether rows are in the order of cells."""
 
@@ -291,8 +299,17 @@ class Nearby:
                     parts = found.arranged[name].real, found.arranged[name].ghosts
                     columns[then] = np.concatenate([*(p.position[axis] for p in parts), [0]])
             for field_ in sorted(wanted[name] - set(columns)):
-                columns[field_] = self._space((name, field_), (size,))
-                packing.values(body.column(field_), columns[field_])
+                kept = found.columns.get((name, field_))
+                if kept is None:
+                    lasts = body.lasts(field_)
+                    room = (
+                        np.empty(size, self.real) if lasts else self._space((name, field_), (size,))
+                    )
+                    packing.values(body.column(field_), room)
+                    kept = room
+                    if lasts:
+                        found.columns[name, field_] = room
+                columns[field_] = kept
             packed[name] = columns
         return packed, float(np.sqrt(moved))
 
@@ -314,23 +331,26 @@ class Nearby:
         out[:] = 0
         own, other = law.fields
         mine = tuple(packed[target][name] for name in own)
-        numbers = law.numbers(time, self.real)
         limit, listed = self.real(law.reach(time)) ** 2, self.real(found.radius) ** 2
         kernel = law.sweep(what)
         for source in sources:
+            numbers = law.numbers(time, self.real, (target, source))
             theirs = tuple(packed[source][name] for name in other)
             parts = found.near[target, source]
 
             def sweep(
-                k: int, theirs: Any = theirs, parts: Any = parts, source: str = source
+                k: int,
+                numbers: Any = numbers,
+                theirs: Any = theirs,
+                parts: Any = parts,
+                source: str = source,
             ) -> None:
                 part = parts[k]
-                longest = int(np.diff(part.first).max(initial=1))
-                room: NDArray[Any] = np.empty((len(other), longest), self.real)
+                room: NDArray[Any] = np.empty((len(other), part.longest), self.real)
                 best: NDArray[Any] = np.empty(max(law.nearest, 1), self.real)
                 pick = np.empty(max(law.nearest, 1), np.int64)
                 kernel(
-                    numbers, mine, theirs, *part, source == target, limit, listed, room, best,
+                    numbers, mine, theirs, *part[:3], source == target, limit, listed, room, best,
                     pick, out,
                 )  # fmt: skip
 

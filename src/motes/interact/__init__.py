@@ -10,7 +10,9 @@ r.square, r.length.
 
 A law without a reach, such as gravity, defines `accelerations(p, bodies)`: from the positions and
 masses of all systems that take part, an array (3, n) [m/s2] for each of them; it may define
-`energy(p, bodies)`, their potential energy [J].
+`energy(p, bodies)`, their potential energy [J]. What happens at the end of a step, such as a
+collision or a thermostat, defines `exchange(p, movers, when)`, which changes velocities, and
+returns whether it moved anybody.
 
 Systems that share an interaction are one group and take every stage of a step together.
 """
@@ -48,7 +50,7 @@ KIND = Kind(
     "interact",
     "interaction",
     "scene",
-    ("accelerations", "force", "near"),
+    ("accelerations", "force", "near", "exchange"),
     _Common,
     {"force": _Near, "near": _Gathering},
 )
