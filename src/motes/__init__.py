@@ -10,7 +10,19 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from motes import emit, flow, force, gravity, interact, look, neighbours, ode, retire, solid
+    from motes import (
+        emit,
+        flow,
+        force,
+        gravity,
+        interact,
+        look,
+        matter,
+        neighbours,
+        ode,
+        retire,
+        solid,
+    )
     from motes.catalog import (
         Color,
         Flag,
@@ -31,7 +43,7 @@ if TYPE_CHECKING:
     from motes.frame import Frame
     from motes.jit import threads
     from motes.production import film, redraw
-    from motes.scene import Camera, Film, Scene, Sky, System, load
+    from motes.scene import Camera, Film, Periodic, Scene, Sky, System, load
     from motes.simulation import Simulation
     from motes.studio import Studio
     from motes.studio import picture as render
@@ -48,6 +60,7 @@ __all__ = [
     "MotesError",
     "Number",
     "OutputError",
+    "Periodic",
     "Scene",
     "SceneError",
     "Simulation",
@@ -65,6 +78,7 @@ __all__ = [
     "interact",
     "load",
     "look",
+    "matter",
     "neighbours",
     "ode",
     "quantity",
@@ -95,6 +109,7 @@ _HOMES = {
     "redraw": "production",
     "Camera": "scene",
     "Film": "scene",
+    "Periodic": "scene",
     "Scene": "scene",
     "Sky": "scene",
     "System": "scene",

@@ -20,6 +20,7 @@ TABLES = {
     "film": "[film]",
     "camera": "[camera]",
     "sky": "[sky]",
+    "periodic": "[periodic]",
     "system": '[[system]]\nname = "water"',
 }
 """Tables of a scene, and how each begins in TOML."""

@@ -6,24 +6,32 @@ momentum and order. Here each stage is evaluated for the whole group before the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from motes.capture import Captures
 from motes.catalog import Component
+from motes.compile.pairs import Law
 from motes.compile.staged import combine
-from motes.errors import SceneError
+from motes.constrain import Constraints, Ground
+from motes.errors import SceneError, likely
+from motes.interact.arrange import Box
 from motes.jit import blocks, share
+from motes.nearby import Body, Lasting, Nearby
 from motes.state import Particles
 from motes.step import Interval, Stepper
 from motes.tableau import Explicit, Splitting
 
-BLOCK = 1 << 16
+BLOCK = 1 << 14
 """Rows of one kernel call."""
+
+Interactions = tuple[tuple[str, Component], ...]
 
 
 @dataclass(frozen=True)
@@ -35,27 +43,54 @@ class Bodies:
     mass: NDArray[Any]
 
 
+@dataclass(frozen=True)
+class Movers:
+    """What an exchange sees of one system and may change: its rows' positions and velocities."""
+
+    name: str
+    position: NDArray[Any]
+    """(3, n) [m]"""
+    velocity: NDArray[Any]
+    """(3, n) [m/s]"""
+    mass: NDArray[Any]
+    """(n,) [kg]"""
+    size: NDArray[Any]
+    """(n,) diameters [m]"""
+    ids: NDArray[np.uint64]
+
+
+@dataclass(frozen=True)
+class Occasion:
+    """When an exchange happens: at the end of a step of a length [s], in a box, at an address."""
+
+    length: float
+    step: int
+    address: str
+    seed: int
+    periodic: Box
+
+
 @dataclass
 class _Member:
-    """One system of the group during a step: state y (6, n), push (3, n) and mass (n,)."""
+    """One system of the group during a step: state y (6, capacity) and push (3, n)."""
 
     stepper: Stepper
     rows: Particles
     alive: int
     y: NDArray[Any]
+    """The particles' own positions and velocities, or a copy where a flight has to be kept."""
     push: NDArray[Any]
-    mass: NDArray[Any]
-
-    def store(self) -> None:
-        """Write the state back into the particles' columns."""
-        self.rows.position[:, : self.alive] = self.y[:3]
-        self.rows.velocity[:, : self.alive] = self.y[3:]
 
     def each(self, name: str, *arguments: Any) -> None:
         """Run one of the system's staged kernels over all rows that were alive."""
         kernel = self.stepper.system.staged(name)
         columns, parts = (self.rows.birth, self.rows.columns), blocks(self.alive, BLOCK)
         share(lambda k: kernel(self.y, *columns, self.push, *arguments, *parts[k]), len(parts))
+
+    def body(self, time: float) -> Body:
+        """The system as laws of limited reach see it."""
+        x, v = self.y[:3, : self.alive], self.y[3:, : self.alive]
+        return Body(self.stepper, self.rows, self.alive, x, v, time)
 
     @property
     def K(self) -> Any:
@@ -67,62 +102,120 @@ class Group:
     """Steps systems that interact."""
 
     def __init__(
-        self, steppers: dict[str, Stepper], interactions: tuple[tuple[str, Component], ...]
+        self,
+        steppers: dict[str, Stepper],
+        interactions: Interactions,
+        precision: str,
+        strict: bool,
+        periodic: Box,
+        solids: Interactions = (),
     ) -> None:
-        self.steppers, self.interactions = steppers, interactions
+        self.steppers = steppers
+        self.interactions = _having(interactions, "accelerations")
+        self.exchanges = _having(interactions, "exchange")
+        self._local = _having(interactions, "reach")
+        laws = _having(interactions, "velocities")
+        self.constraints = Constraints(laws, Ground(solids if laws else ()))
+        self.captures = Captures(_having(interactions, "captures"))
+        self._strict, self._periodic = strict, periodic
+        self.nearby = self._nearby(precision)
         motions = [stepper.system.motion for stepper in steppers.values()]
         self.method = motions[0].method
         who = f"systems {', '.join(steppers)} interact"
         if any(motion.method is not self.method for motion in motions):
             raise SceneError(f"{who} and must have one integrator.")
+        if laws and not isinstance(self.method, Splitting):
+            raise SceneError(
+                f'{who} by "{laws[0][1].name}", a law of velocities, which holds between kick and '
+                'drift: choose integrator = "semi_implicit_euler" or another splitting method.'
+            )
         if not all(motion.inertial for motion in motions):
             raise SceneError(f"{who} and must have velocities: give them a force besides flows.")
-        if any(stepper.system.surfaces for stepper in steppers.values()):
-            raise SceneError(
-                f"{who}, and such systems do not bounce yet: write collides = false in the solids."
-            )
 
-    def step(self, systems: dict[str, Particles], interval: Interval) -> None:
+    def _nearby(self, precision: str) -> Nearby:
+        laws = []
+        for address, part in self._local:
+            targets = _named(part, "systems", self.steppers)
+            sources = _named(part, "sources", self.steppers, targets)
+            laws.append((Law(address, part, precision, self._strict), targets, sources))
+        real = np.float32 if precision == "single" else np.float64
+        return Nearby(laws, real, self._periodic)
+
+    @cached_property
+    def _measured(self) -> Nearby:
+        """The laws of limited reach in double precision, to measure with."""
+        return self._nearby("double")
+
+    def step(self, systems: dict[str, Particles], interval: Interval, memory: Lasting) -> None:
         """Take all systems through one step, in place."""
         alive = {name: s.births(systems[name], interval) for name, s in self.steppers.items()}
+        kept = {name: (alive[name], systems[name].deaths) for name in alive}
+        if memory.kept != kept:
+            memory.kept, memory.push = kept, None
+        self.nearby.settle(self._bodies(systems, alive, interval.begin), memory)
         members = {name: self._member(name, systems[name], alive[name]) for name in alive}
         if isinstance(self.method, Splitting):
-            self._split(members, interval, self.method)
+            self._split(members, interval, self.method, memory)
         else:
-            self._runge_kutta(members, interval, self.method)
+            self._runge_kutta(members, interval, self.method, memory)
         for name, stepper in self.steppers.items():
-            members[name].store()
+            if stepper.system.surfaces is not None:
+                if stepper.rebounds(systems[name], members[name].y, alive[name], interval):
+                    memory.push = None
+                systems[name].motion[:, : alive[name]] = members[name].y
+        for address, part in self.exchanges:
+            self._exchange(address, part, members, interval, memory)
+        seed = next(iter(self.steppers.values())).seed
+        span = (interval.begin, interval.end)
+        self.captures.find(systems, span, seed, alive, _values)
+        for name, stepper in self.steppers.items():
             newborn = np.arange(alive[name], systems[name].count)
             stepper.exceptions(systems[name], newborn, interval)
             stepper.events()
-            stepper.deaths(systems[name], interval)
+            rows, caught = systems[name], self.captures.rows(name)
+            stepper.deaths(rows, np.arange(rows.count), interval, caught)
+
+    def _bodies(
+        self, systems: dict[str, Particles], alive: dict[str, int], time: float
+    ) -> dict[str, Body]:
+        found = {}
+        for name, stepper in self.steppers.items():
+            rows, n = systems[name], alive[name]
+            found[name] = Body(stepper, rows, n, rows.position[:, :n], rows.velocity[:, :n], time)
+        return found
 
     def _member(self, name: str, rows: Particles, alive: int) -> _Member:
-        y = np.concatenate([rows.position[:, :alive], rows.velocity[:, :alive]])
         stepper = self.steppers[name]
-        push, mass = np.zeros((3, alive), rows.real), stepper.mass(rows, alive)
-        return _Member(stepper, rows, alive, y, push, mass)
+        y = rows.motion if stepper.system.surfaces is None else rows.motion[:, :alive].copy()
+        return _Member(stepper, rows, alive, y, np.zeros((3, 0), rows.real))
 
-    def _split(self, members: dict[str, _Member], interval: Interval, method: Splitting) -> None:
+    def _split(
+        self, members: dict[str, _Member], interval: Interval, method: Splitting, memory: Lasting
+    ) -> None:
         h = interval.length
+        before = {
+            name: m.y[3:, : m.alive].copy() for name, m in members.items() if self.constraints.laws
+        }
         for kick, drift, place in zip(
             method.kicks, (*method.drifts, 0.0), method.times, strict=True
         ):
-            time = interval.begin + place * h
+            time = _at(interval, place)
             if kick:
-                self._interact(members, time)
+                self._interact(members, time, memory)
                 for member in members.values():
                     member.each("kick", member.K, time, kick * h)
             if drift:
+                self.constraints.apply(members, before, time, drift * h, _partners, _values)
+                memory.push = None
                 for member in members.values():
                     member.each("drift", member.K, time, drift * h)
 
     def _runge_kutta(
-        self, members: dict[str, _Member], interval: Interval, method: Explicit
+        self, members: dict[str, _Member], interval: Interval, method: Explicit, memory: Lasting
     ) -> None:
         h, s = interval.length, method.stages
-        bases = {name: m.y.copy() for name, m in members.items()}
-        slopes = {name: np.zeros((s, *m.y.shape), m.y.dtype) for name, m in members.items()}
+        bases = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
+        slopes = {name: np.zeros((s, 6, m.alive), m.y.dtype) for name, m in members.items()}
         for i, row in enumerate((*method.a, method.b)):
             weights = np.array(row, float)
             for name, member in members.items():
@@ -130,23 +223,68 @@ class Group:
                 real = member.y.dtype.type
                 arguments = (bases[name], slopes[name], weights.astype(real), real(h), member.y)
                 share(lambda k, a=arguments, p=parts: combine(*a, *p[k]), len(parts))  # type: ignore[misc]
+            memory.push = None
             if i == s:
                 return
-            time = interval.begin + method.c[i] * h
-            self._interact(members, time)
+            time = _at(interval, method.c[i])
+            self._interact(members, time, memory)
             for name, member in members.items():
                 member.each("slope", slopes[name][i], member.K, time)
 
-    def _interact(self, members: dict[str, _Member], time: float) -> None:
-        """Fill every member's push with what the interactions give at a time."""
-        for member in members.values():
-            member.push[:] = 0
-        bodies = [Bodies(name, m.y[:3], m.mass) for name, m in members.items()]
-        for _, interaction in self.interactions:
-            chosen, p = _partners(interaction, bodies), _values(interaction, time)
-            pushes = _kernel(interaction, "accelerations")(p, chosen)
-            for body, push in zip(chosen, pushes, strict=True):
-                members[body.name].push += push
+    def _interact(self, members: dict[str, _Member], time: float, memory: Lasting) -> None:
+        """Give every member the push of the interactions at a time.
+
+        What was summed up last holds as long as nothing has moved: the end of one step of the
+        leapfrog is the begin of the next.
+        """
+        if memory.push is None or memory.time != time or self.nearby.depends_on_velocity:
+            memory.push = self._pushes(members, time, memory)
+            memory.time = time
+        for name, member in members.items():
+            member.push = memory.push[name]
+
+    def _pushes(
+        self, members: dict[str, _Member], time: float, memory: Lasting
+    ) -> dict[str, NDArray[Any]]:
+        pushes = {name: np.zeros((3, m.alive), m.y.dtype) for name, m in members.items()}
+        if self.interactions:
+            bodies = [
+                Bodies(
+                    name, np.ascontiguousarray(m.y[:3, : m.alive]), m.stepper.mass(m.rows, m.alive)
+                )
+                for name, m in members.items()
+            ]
+            for _, interaction in self.interactions:
+                chosen, p = _partners(interaction, bodies), _values(interaction, time)
+                found = _kernel(interaction, "accelerations")(p, chosen)
+                for body, push in zip(chosen, found, strict=True):
+                    pushes[body.name] += push
+        if self._local:
+            near = {name: member.body(time) for name, member in members.items()}
+            self.nearby.push(near, pushes, memory)
+        return pushes
+
+    def _exchange(
+        self,
+        address: str,
+        part: Component,
+        members: dict[str, _Member],
+        interval: Interval,
+        memory: Lasting,
+    ) -> None:
+        """Let particles exchange motion at a step's end."""
+        p, chosen = _values(part, interval.end), _named(part, "systems", members)
+        movers, seed = [], 0
+        for name in chosen:
+            member = members[name]
+            rows, n, stepper = member.rows, member.alive, member.stepper
+            mass, seed = stepper.mass(rows, n), int(stepper.seed)
+            size = stepper.trait("size", rows, n, interval.end)
+            x, v = rows.position[:, :n], rows.velocity[:, :n]
+            movers.append(Movers(name, x, v, mass, size, rows.ids[:n]))
+        when = Occasion(interval.length, memory.steps, address, seed, self._periodic)
+        if _kernel(part, "exchange")(p, movers, when):
+            memory.push = None
 
     def energy(self, systems: dict[str, Particles], time: float) -> float:
         """Potential energy [J] of the interactions that define one."""
@@ -155,11 +293,39 @@ class Group:
             rows = systems[name]
             place = rows.position[:, : rows.count]
             bodies.append(Bodies(name, place, stepper.mass(rows, rows.count)))
-        return sum(
+        far = sum(
             float(_kernel(part, "energy")(_values(part, time), _partners(part, bodies)))
             for _, part in self.interactions
             if type(part).kernel("energy") is not None
         )
+        return far + (self._measured.energy(self._all(systems, time)) if self._local else 0.0)
+
+    def virial(self, systems: dict[str, Particles], time: float) -> NDArray[np.float64]:
+        """Sums r_i f_j over the pairs of pair laws: xx, yy, zz, xy, xz, yz (6,) [J]."""
+        if not self._local:
+            return np.zeros(6)
+        return self._measured.virial(self._all(systems, time))
+
+    def _all(self, systems: dict[str, Particles], time: float) -> dict[str, Body]:
+        return self._bodies(systems, {name: systems[name].count for name in self.steppers}, time)
+
+
+def _at(interval: Interval, share: float) -> float:
+    """A time within a step; its end is the next one's begin, to the last bit."""
+    return interval.end if share == 1.0 else interval.begin + share * interval.length
+
+
+def _having(interactions: Interactions, kernel: str) -> Interactions:
+    """The interactions that define a kernel."""
+    return tuple(pair for pair in interactions if type(pair[1]).kernel(kernel) is not None)
+
+
+def named_systems(interaction: Component) -> set[str]:
+    """All systems that an interaction links; none where it names nobody, which means all."""
+    named = set(interaction.values["systems"].document())
+    others = (interaction.values[key].document() for key in ("sources", "hunters")
+              if key in interaction.values)  # fmt: skip
+    return named.union(*others) if named else named
 
 
 def _kernel(interaction: Component, name: str) -> Callable[..., Any]:
@@ -168,7 +334,21 @@ def _kernel(interaction: Component, name: str) -> Callable[..., Any]:
     return function
 
 
-def _partners(interaction: Component, bodies: list[Bodies]) -> list[Bodies]:
+def _named(
+    part: Component, key: str, known: Iterable[str], otherwise: Iterable[str] = ()
+) -> tuple[str, ...]:
+    """The systems that an interaction names, or others, or all that it could."""
+    named = part.values[key].document()
+    for name in named:
+        if name not in known:
+            raise SceneError(
+                f'interaction "{part.name}": {key} names "{name}", which does not take part in it.'
+                f"{likely(name, known)} There are: {', '.join(known)}."
+            )
+    return tuple(sorted(named or otherwise or known))
+
+
+def _partners(interaction: Component, bodies: list[Any]) -> list[Any]:
     """The bodies that take part in an interaction."""
     named = interaction.values["systems"].document()
     return [body for body in bodies if not named or body.name in named]

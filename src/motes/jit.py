@@ -17,7 +17,7 @@ import pickle
 import platform
 import types
 from collections.abc import Callable
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -147,8 +147,9 @@ def available_processors() -> int:
 def share(task: Callable[[int], Any], count: int) -> None:
     """Run `task(0) ... task(count - 1)` on the threads; the first exception is raised again here.
 
-    An interrupt (Ctrl-C) drops the tasks that have not begun and waits for the running ones, each
-    of which should take at most about 100 ms.
+    The calling thread works too, so that a short call costs little. An interrupt (Ctrl-C) drops the
+    tasks that have not begun and waits for the running ones, each of which should take at most
+    about 100 ms.
     """
     global _pool
     if count <= 1 or threads() == 1:
@@ -157,15 +158,21 @@ def share(task: Callable[[int], Any], count: int) -> None:
         return
     if _pool is None:
         _pool = ThreadPoolExecutor(threads(), "motes")
-    futures = [_pool.submit(task, number) for number in range(count)]
+    numbers = iter(range(count))  # Each thread takes the next one.
+
+    def work() -> None:
+        for number in numbers:
+            task(number)
+
+    helpers = [_pool.submit(work) for _ in range(min(threads(), count) - 1)]
     try:
-        done, _ = wait(futures, return_when=FIRST_EXCEPTION)
-        for future in done:
-            future.result()
+        work()
+        for helper in helpers:
+            helper.result()
     except BaseException:
-        for future in futures:
-            future.cancel()
-        wait(futures)
+        for _ in numbers:
+            pass
+        wait(helpers)
         raise
 
 

@@ -16,6 +16,10 @@ SHARE = 0.8
 _budget: int | None = None
 
 
+LINE = 64
+"""Bytes of a cache line."""
+
+
 def budget() -> int:
     """Bytes that one array may have: MOTES_MEMORY (in MiB), or 80 % of what is available."""
     global _budget
@@ -29,7 +33,10 @@ def budget() -> int:
 
 
 def allocate(shape: tuple[int, ...], dtype: DTypeLike, what: str) -> NDArray[Any]:
-    """An array of zeros. Raises MemoryBudgetError, with nothing allocated, when it is too large."""
+    """An array of zeros that begins at a cache line.
+
+    Raises MemoryBudgetError, with nothing allocated, when it is too large.
+    """
     size = int(np.prod(shape, dtype=object)) * np.dtype(dtype).itemsize
     if size > budget():
         raise MemoryBudgetError(
@@ -37,10 +44,12 @@ def allocate(shape: tuple[int, ...], dtype: DTypeLike, what: str) -> NDArray[Any
             "Emit fewer particles, shorten their life, set a capacity, or raise MOTES_MEMORY [MiB]."
         )
     try:
-        return np.zeros(shape, dtype)
+        room = np.zeros(size + LINE, np.uint8)
     except MemoryError:
         message = f"{what} would need {_shown(size)}; the system has no more."
         raise MemoryBudgetError(message) from None
+    start = -room.ctypes.data % LINE
+    return room[start : start + size].view(dtype).reshape(shape)
 
 
 def _shown(size: int) -> str:

@@ -7,8 +7,10 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from motes.appearance import Look
+from motes.capture import CAPTURE
 from motes.catalog import Component, find
 from motes.compile.motion import Motion
 from motes.compile.system import CompiledSystem
@@ -16,8 +18,11 @@ from motes.diagnose import explain_infinity
 from motes.emission import Clock
 from motes.errors import SceneError, SimulationError, likely
 from motes.frame import Frame
-from motes.group import Group
+from motes.group import Group, named_systems
 from motes.integrate import method
+from motes.interact.arrange import Box, wrapped
+from motes.nearby import Lasting
+from motes.philox import channel
 from motes.record.energy import Matter, Measures, measure
 from motes.scene.address import component_address
 from motes.scene.document import Scene, System
@@ -41,12 +46,15 @@ class Simulation:
         self._lead_in = round(scene.prewarm / scene.step)
         self.start = -self._lead_in * scene.step
         """Scene time at which the first step begins: 0 less the steps nearest to the prewarm."""
+        self._periodic = Box(
+            np.array(scene.periodic.low, float), np.array(scene.periodic.size, float)
+        )
         self._steppers = {s.name: self._stepper(s) for s in scene.systems}
         self._groups = self._grouped()
         self._looks = {s.name: Look(s) for s in scene.systems}
         self._systems = {s.name: s for s in scene.systems}
         real = np.float32 if scene.precision == "single" else np.float64
-        self._state = State(0, {})
+        self._state = State(0, {}, [Lasting() for _ in self._groups])
         for system in scene.systems:
             compiled = self._steppers[system.name].system
             widths = [(c.address, c.width) for c in compiled.columns]
@@ -81,6 +89,7 @@ class Simulation:
             tuple((component_address(system, r), r) for r in retire),
             traits,
             method(system.integrator or scene.integrator),
+            addressed(scene.solid, ()),
         )
         emitters = addressed((), system.emit)
         compiled = CompiledSystem(
@@ -91,8 +100,7 @@ class Simulation:
 
     def _grouped(self) -> list[Group]:
         """Groups of systems that interact, directly or through others."""
-        links = [set(part.values["systems"].document()) for part in self.scene.interact]
-        links = [link or set(self._steppers) for link in links]
+        links = [named_systems(part) or set(self._steppers) for part in self.scene.interact]
         for part, link in zip(self.scene.interact, links, strict=True):
             for name in sorted(link - set(self._steppers)):
                 raise SceneError(
@@ -112,6 +120,10 @@ class Simulation:
                     for part, link in zip(self.scene.interact, links, strict=True)
                     if link & group
                 ),
+                self.scene.precision,
+                self.scene.mode == "strict",
+                self._periodic,
+                tuple((component_address(None, part), part) for part in self.scene.solid),
             )
             for group in groups
         ]
@@ -135,6 +147,12 @@ class Simulation:
     def impacts(self) -> int:
         """Impacts on solids so far."""
         return sum(s.impacts for s in self._steppers.values())
+
+    @property
+    def captures(self) -> NDArray[Any]:
+        """Captures so far, by time: structured, time [s], hunter and prey (ids), place [m]."""
+        kept = [part for group in self._groups for part in group.captures.kept]
+        return np.sort(np.concatenate([np.zeros(0, CAPTURE), *kept]), order=("time", "prey"))
 
     def __getitem__(self, name: str) -> View:
         if name not in self._systems:
@@ -166,6 +184,36 @@ class Simulation:
                 potential += float(mass @ stepper.system.potential(rows, self.time))
         potential += sum(group.energy(systems, self.time) for group in self._groups)
         return measure(self.time, matter, potential)
+
+    def virial(self) -> NDArray[np.float64]:
+        """Sums r_a f_b (3, 3) [J] over all pairs of the pair laws, now; W is its trace."""
+        xx, yy, zz, xy, xz, yz = sum(
+            (group.virial(self._state.systems, self.time) for group in self._groups), np.zeros(6)
+        )
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def listed_radius(self) -> float:
+        """Radius of the widest neighbour lists [m], 0 where no law has a reach."""
+        return max((group.nearby.radius(self.time) for group in self._groups), default=0.0)
+
+    def place(self, system: str, position: ArrayLike, velocity: ArrayLike = 0.0) -> None:
+        """Add particles at given places, now, to those that emitters make.
+
+        `position`: (n, 3) [m]. `velocity`: (n, 3), or one for all (3,) [m/s]. Raises SceneError if
+        there is no such system or its particles have values that are drawn at birth, ValueError for
+        arrays of other shapes.
+        """
+        self[system]
+        rows = self._state.systems[system]
+        if rows.widths:
+            drawn = ", ".join(address for address, _ in rows.widths)
+            raise SceneError(f'system "{system}": placed particles cannot draw {drawn}.')
+        x = np.asarray(position, float)
+        if x.ndim != 2 or x.shape[1] != 3:
+            raise ValueError(f"position must be (n, 3), not {x.shape}")
+        v = np.broadcast_to(np.asarray(velocity, float), x.shape)
+        rows.append(x.T, v.T, self.time, np.uint64(channel(f"{system}.place")))
+        wrapped(rows.position[:, : rows.count], self._periodic)
 
     def step(self) -> None:
         """Take one step."""
@@ -214,8 +262,12 @@ class Simulation:
             self.work += state.systems[name].count
             if name not in grouped:
                 self._steppers[name].step(state.systems[name], interval)
-        for group in self._groups:
-            group.step(state.systems, interval)
+        for group, memory in zip(self._groups, state.memories, strict=True):
+            assert isinstance(memory, Lasting)
+            group.step(state.systems, interval, memory)
+        if self._periodic.size.any():
+            for particles in state.systems.values():
+                wrapped(particles.position[:, : particles.count], self._periodic)
         state.number += 1
 
     def _steps_before(self, time: float) -> int:
@@ -240,12 +292,15 @@ class Simulation:
         """A copy of the state, taken to a time beyond it by steps and a partial one."""
         state = self._state.copy()
         impacts = {name: s.impacts for name, s in self._steppers.items()}
+        captures = [len(group.captures.kept) for group in self._groups]
         while (ahead := time - self._step_begin(state)) > EDGE * self.scene.step:
             whole = ahead > (1 - EDGE) * self.scene.step
             end = self._step_begin(state, 1) if whole else time
             self._advance(state, Interval(self._step_begin(state), end))
         for name, stepper in self._steppers.items():
             stepper.impacts = impacts[name]
+        for group, length in zip(self._groups, captures, strict=True):
+            del group.captures.kept[length:]
         return state, time
 
     def frames(self, first: int | None = None, last: int | None = None) -> Iterator[Frame]:

@@ -1,25 +1,30 @@
 """The state: everything that can change the next bit of a simulation, and nothing else.
 
 Columns are arrays of one number a particle, positions and velocities one (3, capacity) block each.
-Rows move only in `Particles.keep`. Births need no memory: the k-th birth of an emitter is a
-function of time.
+Rows move only in `Particles.keep` and `Particles.reorder`. Births need no memory: the
+k-th birth of an emitter is a function of time.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motes.jit import jit, share
 from motes.memory import allocate
+from motes.philox import hash_id
 
 SMALLEST = 1024
-"""Rows that a system starts with."""
+"""Rows that a system starts with, and a number of which all capacities are about a multiple."""
+
+SHIFT = 176
+"""Rows more than such a multiple. Columns a power of two apart would share the same few places of
+every cache, and the same banks of memory; with this shift a step is half again as fast."""
 
 
 @dataclass
@@ -33,6 +38,10 @@ class Particles:
     widths: Sequence[tuple[str, int]]
     """Addresses and widths of the columns drawn at birth."""
     count: int = 0
+    deaths: int = 0
+    """How many have died so far; with the count it tells whether rows are still the same."""
+    motion: NDArray[Any] = field(init=False)
+    """Positions and velocities in one block, (6, capacity)."""
     position: NDArray[Any] = field(init=False)
     velocity: NDArray[Any] = field(init=False)
     birth: NDArray[np.float64] = field(init=False)
@@ -42,7 +51,7 @@ class Particles:
     """Values drawn at birth, one array a component, in the order of `widths`."""
 
     def __post_init__(self) -> None:
-        self._allocate(SMALLEST)
+        self._allocate(_roomy(SMALLEST))
 
     @property
     def capacity(self) -> int:
@@ -51,8 +60,9 @@ class Particles:
 
     def _allocate(self, rows: int) -> None:
         what = f'system "{self.name}" with {rows} rows'
-        self.position = allocate((3, rows), self.real, what)
-        self.velocity = allocate((3, rows if self.moves else 0), self.real, what)
+        self.motion = allocate((6 if self.moves else 3, rows), self.real, what)
+        self.position = self.motion[:3]
+        self.velocity = self.motion[3:] if self.moves else np.zeros((3, 0), self.real)
         self.birth = allocate((rows,), np.float64, what)
         self.ids = allocate((rows,), np.uint64, what)
         width = sum(w for _, w in self.widths)
@@ -68,24 +78,46 @@ class Particles:
         """Make room for more rows; capacity doubles, and what is alive is copied."""
         if self.count + more <= self.capacity:
             return
-        rows = self.capacity
-        while rows < self.count + more:
-            rows *= 2
+        rows = _roomy(max(2 * self.capacity, self.count + more))
         old = self.arrays()
         self._allocate(rows)
         for before, after in zip(old, self.arrays(), strict=True):
             after[: self.count] = before[: self.count]
 
+    def append(
+        self, position: NDArray[Any], velocity: NDArray[Any], birth: float, address: np.uint64
+    ) -> None:
+        """Add rows (3, n), born at a time [s], whose ids hang on an address and their number."""
+        more, first = position.shape[1], self.count
+        self.reserve(more)
+        new = slice(first, first + more)
+        self.position[:, new] = position
+        if self.moves:
+            self.velocity[:, new] = velocity
+        self.birth[new] = birth
+        _name(address, first, self.ids[new])
+        self.count += more
+
     def keep(self, dead: NDArray[np.uint8]) -> int:
         """Close the gaps of the rows marked dead, in order; returns how many went."""
-        first = int(np.argmax(dead[: self.count])) if self.count else 0
+        first = int(np.argmax(dead[: self.count].view(bool))) if self.count else 0
         if self.count == 0 or not dead[first]:
             return 0
         arrays = self.arrays()
         share(lambda k: _compact(arrays[k], dead, first, self.count), len(arrays))
         gone = int(np.count_nonzero(dead[: self.count]))
         self.count -= gone
+        self.deaths += gone
         return gone
+
+    def reorder(self, order: NDArray[np.int32]) -> None:
+        """Move rows: row k becomes what row `order[k]` was, for the first of the rows."""
+        arrays = self.arrays()
+
+        def move(k: int) -> None:
+            arrays[k][: order.size] = arrays[k][order]
+
+        share(move, len(arrays))
 
     def first_not_finite(self) -> int | None:
         """The first row whose position or velocity is infinite or not a number, or None."""
@@ -103,10 +135,20 @@ class Particles:
         """An independent copy of the rows that are alive, with room for births."""
         twin = object.__new__(Particles)
         twin.__dict__.update(self.__dict__)
-        twin._allocate(max(SMALLEST, self.count + self.count // 8))
+        twin._allocate(_roomy(self.count + self.count // 8))
         for mine, theirs in zip(self.arrays(), twin.arrays(), strict=True):
             theirs[: self.count] = mine[: self.count]
         return twin
+
+
+class Memory(Protocol):
+    """What a group keeps: a copy shares arrays, which are replaced and never written to."""
+
+    def copy(self) -> Memory:
+        """An independent copy."""
+
+    def arrays(self) -> Iterator[NDArray[Any]]:
+        """Everything in it that can change the next bit."""
 
 
 @dataclass
@@ -115,10 +157,13 @@ class State:
 
     number: int
     systems: dict[str, Particles]
+    memories: list[Memory] = field(default_factory=list)
+    """What each group of systems that interact keeps from step to step."""
 
     def copy(self) -> State:
         """An independent copy."""
-        return State(self.number, {name: p.copy() for name, p in self.systems.items()})
+        systems = {name: p.copy() for name, p in self.systems.items()}
+        return State(self.number, systems, [memory.copy() for memory in self.memories])
 
     def digest(self) -> str:
         """One hash of the whole state, of 32 hexadecimal digits."""
@@ -127,7 +172,22 @@ class State:
             total.update(f"{name} {particles.count} {particles.widths}".encode())
             for array in particles.arrays():
                 total.update(np.ascontiguousarray(array[: particles.count]).data)
+        for memory in self.memories:
+            for array in memory.arrays():
+                total.update(np.ascontiguousarray(array).data)
         return total.hexdigest()
+
+
+def _roomy(rows: int) -> int:
+    """A capacity of at least so many rows."""
+    return -(-rows // SMALLEST) * SMALLEST + SHIFT
+
+
+@jit
+def _name(address, first, ids):  # type: ignore[no-untyped-def]
+    """Ids of births from a number on."""
+    for i in range(ids.size):
+        ids[i] = hash_id(address, np.uint64(first + i))
 
 
 @jit

@@ -14,8 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motes.compile.straight import THREATENED
 from motes.compile.system import CompiledSystem
 from motes.emission import Clock, Source
+from motes.errors import SceneError
 from motes.jit import blocks, share
 from motes.state import Particles
 
@@ -62,23 +64,34 @@ class Stepper:
     def step(self, rows: Particles, interval: Interval) -> None:
         """Take the system through one step, in place."""
         alive = self.births(rows, interval)
-        exceptional = [
-            self.integrate(rows, alive, interval),
-            self.newborns(rows, alive, interval),
-        ]
-        self.exceptions(rows, np.concatenate(exceptional), interval)
+        exceptional = np.concatenate(
+            [self.integrate(rows, alive, interval), self.newborns(rows, alive, interval)]
+        )
+        self.exceptions(rows, exceptional, interval)
         self.events()
-        self.deaths(rows, interval)
+        self.deaths(rows, exceptional, interval)
 
     def mass(self, rows: Particles, alive: int) -> NDArray[Any]:
         """Masses [kg] of the rows that were alive, (alive,)."""
-        address, control = self.system.motion.traits["mass"]
+        return self.trait("mass", rows, alive, 0.0)
+
+    def trait(self, name: str, rows: Particles, alive: int, time: float) -> NDArray[Any]:
+        """A trait of one number (mass, size, life) of the rows that were alive, (alive,)."""
+        if name not in self.system.motion.traits:
+            menu = ", ".join(self.system.motion.traits)
+            raise SceneError(f'system "{rows.name}" has no {name}. It has {menu}.')
+        address, control = self.system.motion.traits[name]
         start = 0
         for column in self.system.columns:
             if column.address == address:
                 return rows.columns[start][:alive]
             start += column.width
-        return np.full(alive, float(control.at(0.0)[0]), rows.real)
+        if control.scope == "scene":
+            return np.full(alive, float(control.at(time)[0]), rows.real)
+        raise SceneError(
+            f'system "{rows.name}": laws between particles need a {name} that does not run over '
+            "life or speed."
+        )
 
     def births(self, rows: Particles, interval: Interval) -> int:
         """Append the newborns of the step, as they are at their own instants.
@@ -145,7 +158,7 @@ class Stepper:
             low, high = first + parts[k][0], first + parts[k][1]
             kernel(
                 rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
-                interval.begin, interval.length, low, high,
+                interval.begin, interval.end, low, high,
             )  # fmt: skip
             if self.system.surfaces is not None:
                 found[k] = _marked(flags, low, high)
@@ -170,24 +183,69 @@ class Stepper:
         share(care, len(parts))
         self.impacts += sum(impacts)
 
+    def rebounds(self, rows: Particles, ends: NDArray[Any], alive: int, interval: Interval) -> bool:
+        """Take a group's flight, which leads to `ends` (6, alive), through its impacts.
+
+        Returns whether any row ends elsewhere.
+        """
+        if self.system.surfaces is None:
+            return False
+        threats, flags, parts = self.system.staged("threats"), self._flags(rows), _parts(alive, 1)
+        found = [NOTHING] * len(parts)
+
+        def threaten(k: int) -> None:
+            low, high = parts[k]
+            threats(
+                rows.position, rows.velocity, ends, flags, self.system.K_staged, interval.begin,
+                interval.end, low, high,
+            )  # fmt: skip
+            found[k] = _marked(flags, low, high)
+
+        share(threaten, len(parts))
+        threatened = np.concatenate([NOTHING, *found])
+        parts = _parts(threatened.size, 64)
+        counts = [(0, 0)] * len(parts)
+
+        def care(k: int) -> None:
+            low, high = parts[k]
+            counts[k] = self.system.rebounds(
+                rows.position, rows.velocity, ends, rows.birth, rows.columns, threatened[low:high],
+                self.system.K_exact, self.system.K_solid, interval.begin, interval.length,
+            )  # fmt: skip
+
+        share(care, len(parts))
+        self.impacts += sum(hits for hits, _ in counts)
+        return any(changed for _, changed in counts)
+
     def events(self) -> None:
         """Nothing listens to births, impacts and deaths yet; what will goes here."""
 
-    def deaths(self, rows: Particles, interval: Interval) -> None:
-        """Take out the rows that a retirement claims."""
-        if not self.system.motion.mortal or not rows.count:
+    def deaths(
+        self,
+        rows: Particles,
+        exceptional: NDArray[np.int64],
+        interval: Interval,
+        caught: NDArray[np.int64] = NOTHING,
+    ) -> None:
+        """Take out the rows that were caught, and those that a retirement claims; the straight pass
+        has marked its own.
+        """
+        mortal = self.system.motion.mortal
+        if not rows.count or not (mortal or caught.size):
             return
-        flags = self._flags(rows)
-        parts = _parts(rows.count, 1)
+        flags, parts = self._flags(rows), _parts(exceptional.size if mortal else 0, 1)
+        if not mortal:
+            flags[: rows.count] = 0
 
         def retire(k: int) -> None:
             low, high = parts[k]
             self.system.retire(
                 rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
-                interval.end, 0.0, low, high,
+                interval.end, exceptional[low:high],
             )  # fmt: skip
 
         share(retire, len(parts))
+        flags[caught] = 1
         rows.keep(flags)
 
     def _flags(self, rows: Particles) -> NDArray[np.uint8]:
@@ -207,9 +265,9 @@ def _parts(rows: int, cost: int) -> list[tuple[int, int]]:
 
 
 def _marked(flags: NDArray[np.uint8], low: int, high: int) -> NDArray[np.int64]:
-    """Rows from `low` to `high` whose flag is set: few, as a rule."""
+    """Rows from `low` to `high` that may meet a solid: few, as a rule."""
     words = np.flatnonzero(flags[low : low - (low - high) // WORD * WORD].view(np.uint64))
     near = (low + words[:, np.newaxis] * WORD + np.arange(WORD)).ravel()
-    near = near[flags[near] != 0]
+    near = near[flags[near] & THREATENED != 0]
     marked: NDArray[np.int64] = near[: np.searchsorted(near, high)]
     return marked

@@ -46,8 +46,8 @@ class _RungeKutta:
     @property
     def symplectic(self) -> bool:
         """Whether b_i a_ij + b_j a_ji = b_i b_j: it keeps every quadratic invariant."""
-        a = [[*row, *[0.0] * (self.stages - len(row))] for row in self.a]
-        s, b = range(self.stages), self.b
+        a = [[*row, *[0.0] * (len(self.b) - len(row))] for row in self.a]
+        s, b = range(len(self.b)), self.b
         return all(
             abs(b[i] * a[i][j] + b[j] * a[j][i] - b[i] * b[j]) < TOLERANCE for i in s for j in s
         )
@@ -154,6 +154,27 @@ class Implicit(_RungeKutta):
     def diagonal(self) -> bool:
         """Whether every stage stands for itself: no number above the diagonal."""
         return all(x == 0 for i, row in enumerate(self.a) for x in row[i + 1 :])
+
+    @property
+    def spare_stages(self) -> tuple[int, ...]:
+        """Stages that only the error estimate needs: explicit, and no part of any other's state."""
+        spare: list[int] = []
+        for j in reversed(range(len(self.b))):
+            users = [i for i in range(len(self.b)) if self.a[i][j] and i not in spare]
+            if not (self.b[j] or self.a[j][j] or users):
+                spare.append(j)
+        return tuple(sorted(spare))
+
+    @property
+    def stages(self) -> int:
+        """Evaluations of the right-hand side in a step that stands alone, without an estimate."""
+        return len(self.b) - len(self.spare_stages)
+
+    @property
+    def filter(self) -> float:
+        """Share of the step in the matrix that filters the error estimate: stiff parts vanish."""
+        diagonal = [row[i] for i, row in enumerate(self.a) if row[i]]
+        return diagonal[-1] if self.diagonal or self.b_low is None else self.b_low[0]
 
 
 @dataclass(frozen=True, kw_only=True)

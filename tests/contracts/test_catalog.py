@@ -39,9 +39,8 @@ def values(part: type[Component]) -> SimpleNamespace:
 
 def particle(**changes: float) -> SimpleNamespace:
     state = {"x": 0.7, "y": -0.4, "z": 1.1, "vx": 0.3, "vy": 0.8, "vz": -0.5}
-    return SimpleNamespace(
-        **{**state, **changes}, mass=1.3, age=0.4, life=2.0, size=0.1, color=(1.0, 0.5, 0.2, 0.8)
-    )
+    traits = {"mass": 1.3, "age": 0.4, "life": 2.0, "size": 0.1, "color": (1.0, 0.5, 0.2, 0.8)}
+    return SimpleNamespace(**{**state, **traits, **changes})
 
 
 @pytest.mark.parametrize("part", COMPONENTS)
@@ -65,7 +64,9 @@ def test_a_component_survives_its_own_document(part: type[Component]) -> None:
     assert part(**entry) == made
 
 
-POTENTIALS = [p for p in COMPONENTS if p.values[0].kernel("potential") is not None]
+HAVING = [p for p in COMPONENTS if p.values[0].kernel("potential") is not None]
+POTENTIALS = [p for p in HAVING if p.values[0].kernel("acceleration") is not None]
+PAIR_LAWS = [p for p in COMPONENTS if p.values[0].kernel("force") is not None]
 
 
 @pytest.mark.parametrize("part", POTENTIALS)
@@ -85,6 +86,40 @@ def test_force_is_minus_the_gradient_of_its_potential(part: type[Component]) -> 
                 ends.append(potential(p, moved, 0.3))
             gradient.append((ends[0] - ends[1]) / (2 * h))
         assert acceleration(p, q, 0.3) == pytest.approx(-np.array(gradient), rel=1e-6, abs=1e-8)
+
+
+def way(x: float, y: float, z: float) -> SimpleNamespace:
+    square = x * x + y * y + z * z
+    return SimpleNamespace(x=x, y=y, z=z, square=square, length=math.sqrt(square))
+
+
+def pair_values(part: type[Component]) -> SimpleNamespace:
+    """A pair law's parameters and constants at their defaults."""
+    p = values(part)
+    constants = part.kernel("constants")
+    return SimpleNamespace(**vars(p), **(constants(p) if constants else {}))
+
+
+@pytest.mark.parametrize("part", PAIR_LAWS)
+def test_a_pair_force_is_minus_the_gradient_of_its_potential(part: type[Component]) -> None:
+    """f = -dU/dr r/|r| by central differences, and f(b, a, -r) = -f(a, b, r), within the reach."""
+    p, h = pair_values(part), 1e-6
+    force, potential, reach = (part.kernel(k) for k in ("force", "potential", "reach"))
+    assert force is not None
+    assert reach is not None
+    a, b = particle(vx=0.2), particle(mass=0.7)
+    for share in (0.35, 0.6, 0.9, 0.99):
+        place = share * reach(p) * np.array([2.0, -1.0, 2.0]) / 3.0
+        f = np.array(force(p, a, b, way(*place)))
+        assert np.array(force(p, b, a, way(*-place))) == pytest.approx(-f, rel=1e-12)
+        if potential is None:
+            continue
+        gradient = [
+            (potential(p, a, b, way(*(place + d))) - potential(p, a, b, way(*(place - d))))
+            / (2 * h)
+            for d in h * np.eye(3)
+        ]
+        assert f == pytest.approx(-np.array(gradient), rel=1e-6, abs=1e-8 * abs(f).max() + 1e-9)
 
 
 SOLIDS = [p for p in COMPONENTS if p.values[0].kind.name == "solid"]

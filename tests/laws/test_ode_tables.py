@@ -92,7 +92,7 @@ def test_interpolants_meet_both_ends(share: float):
 def test_rows_of_implicit_tables_are_whole():
     for table in methods().values():
         if isinstance(table, Implicit):
-            assert all(len(row) == table.stages for row in table.a)
+            assert all(len(row) == len(table.b) for row in table.a)
             diagonal = all(
                 row[j] == 0 for i, row in enumerate(table.a) for j in range(i + 1, len(row))
             )

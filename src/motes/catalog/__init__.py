@@ -54,11 +54,20 @@ class Kind:
     scope: str
     kernels: tuple[str, ...] = ()
     common: type | None = None
+    by_kernel: Mapping[str, type] = field(default_factory=dict, hash=False)
+    """In place of `common`, for components that define a kernel of this name."""
 
     @property
     def common_parameters(self) -> dict[str, Parameter]:
         """The parameters that every component of this kind has."""
         return _parameters(self.common, self.scope) if self.common else {}
+
+    def shared(self, part: type) -> type | None:
+        """The class whose parameters a component gets."""
+        for kernel, common in self.by_kernel.items():
+            if kernel in vars(part):
+                return common
+        return self.common
 
     def members(self) -> dict[str, type[Component]]:
         """All components of this kind by name."""
@@ -159,8 +168,7 @@ class Component:
     @classmethod
     def help(cls) -> dict[str, str]:
         """One line of help for each parameter, from the text under its declaration."""
-        shared = attribute_docs(cls.kind.common) if cls.kind.common else {}
-        return {**shared, **attribute_docs(cls)}
+        return {**_documented(cls.kind.shared(cls)), **attribute_docs(cls)}
 
 
 C = TypeVar("C")
@@ -203,7 +211,8 @@ def component(cls: type[C] | None = None, *, kind: str = "", name: str = "") -> 
     made.kind = family
     made.type = name
     made.own = frozenset(own)
-    made.parameters = {**family.common_parameters, **own}
+    common = family.shared(cls)
+    made.parameters = {**(_parameters(common, family.scope) if common else {}), **own}
     made.needs = tuple(body.get("needs", ()))
     if family.kernels and not any(made.kernel(k) for k in family.kernels):
         raise SceneError(
@@ -218,9 +227,16 @@ def _parameters(cls: type, scope: str) -> dict[str, Parameter]:
     """Parameters of a class body, named, in order, with the kind's scope where unstated."""
     return {
         key: value.named(key, scope)
-        for key, value in vars(cls).items()
+        for base in reversed(cls.__mro__)
+        for key, value in vars(base).items()
         if isinstance(value, Parameter)
     }
+
+
+def _documented(cls: type | None) -> dict[str, str]:
+    """Help of the parameters of a class and those that it stands on."""
+    bases = [base for base in reversed(cls.__mro__) if base is not object] if cls else []
+    return {key: text for base in bases for key, text in attribute_docs(base).items()}
 
 
 @cache

@@ -47,8 +47,8 @@ def exceptions_kernel(
 
     `solid` is the module of the solids, whose values are the kernel's `KS`.
     """
-    gather, inertial = module["gather"], motion.inertial
-    resolve = _free(module) if surfaces is None else _flight(module, solid, surfaces, inertial)
+    gather, fly, inertial = module["gather"], module["fly"], motion.inertial
+    resolve = _free() if surfaces is None else _flight(module, solid, surfaces, inertial)
 
     @jit(flags=EXACT)
     def exceptions(position, velocity, birth, columns, rows, K, KS, t, dt):  # type: ignore[no-untyped-def]
@@ -58,9 +58,11 @@ def exceptions_kernel(
             i = rows[r]
             x, y, z = triple(position, i)
             vx, vy, vz = triple(velocity, i) if inertial else (0.0, 0.0, 0.0)
-            born = birth[i]
+            born, C = birth[i], gather(columns, i)
+            begin = max(t, born)
+            ends = fly(x, y, z, vx, vy, vz, born, begin, end - begin, C, K)
             x, y, z, vx, vy, vz, hits = resolve(
-                x, y, z, vx, vy, vz, born, max(t, born), end, gather(columns, i), K, KS
+                x, y, z, vx, vy, vz, ends, born, begin, end, C, K, KS, 0.0, 0.0, 0.0
             )
             impacts += hits
             position[0, i], position[1, i], position[2, i] = x, y, z
@@ -69,6 +71,44 @@ def exceptions_kernel(
         return impacts
 
     return exceptions
+
+
+def rebounds_kernel(
+    module: dict[str, Any], solid: dict[str, Any], motion: Motion, surfaces: Surfaces
+) -> Any:
+    """The kernel that takes given rows of a group through their impacts.
+
+    It returns the number of impacts, and of rows that do not end where the group's flight leads.
+    `ends` (6, n) holds where the group's own flight leads and is overwritten. After an impact a row
+    feels, beside the forces of its system, the mean push of the interactions over the step: what
+    the group's flight has gained in velocity beyond those forces.
+    """
+    gather, fly = module["gather"], module["fly"]
+    resolve = _flight(module, solid, surfaces, motion.inertial)
+
+    @jit(flags=EXACT)
+    def rebounds(position, velocity, ends, birth, columns, rows, K, KS, t, dt):  # type: ignore[no-untyped-def]
+        impacts, changed = 0, 0
+        for r in range(rows.size):
+            i = rows[r]
+            x, y, z = triple(position, i)
+            vx, vy, vz = triple(velocity, i)
+            born, C = birth[i], gather(columns, i)
+            a, b, c = triple(ends, i)
+            va, vb, vc = triple(ends[3:], i)
+            _, _, _, ux, uy, uz = fly(x, y, z, vx, vy, vz, born, t, dt, C, K)
+            gx, gy, gz = (va - ux) / dt, (vb - uy) / dt, (vc - uz) / dt
+            x, y, z, vx, vy, vz, hits = resolve(
+                x, y, z, vx, vy, vz, (a, b, c, va, vb, vc), born, t, t + dt, C, K, KS, gx, gy, gz
+            )
+            impacts += hits
+            same = (x == a) & (y == b) & (z == c) & (vx == va) & (vy == vb) & (vz == vc)
+            changed += 0 if same else 1
+            ends[0, i], ends[1, i], ends[2, i] = x, y, z
+            ends[3, i], ends[4, i], ends[5, i] = vx, vy, vz
+        return impacts, changed
+
+    return rebounds
 
 
 def currents_kernel(module: dict[str, Any]) -> Any:
@@ -91,14 +131,13 @@ def triple(block: Any, i: Any) -> Any:
     return np.float64(block[0, i]), np.float64(block[1, i]), np.float64(block[2, i])
 
 
-def _free(module: dict[str, Any]) -> Any:
+def _free() -> Any:
     """A flight that meets nothing."""
-    fly = module["fly"]
 
     @jit(flags=EXACT, inline=True)
-    def resolve(x, y, z, vx, vy, vz, born, t, end, C, K, KS):  # type: ignore[no-untyped-def]
-        x, y, z, vx, vy, vz = fly(x, y, z, vx, vy, vz, born, t, end - t, C, K)
-        return x, y, z, vx, vy, vz, 0
+    def resolve(x, y, z, vx, vy, vz, ends, born, t, end, C, K, KS, gx, gy, gz):  # type: ignore[no-untyped-def]
+        a, b, c, va, vb, vc = ends
+        return a, b, c, va, vb, vc, 0
 
     return resolve
 
@@ -106,23 +145,24 @@ def _free(module: dict[str, Any]) -> Any:
 def _flight(
     module: dict[str, Any], solid: dict[str, Any], surfaces: Surfaces, inertial: bool
 ) -> Any:
-    """A flight through impacts."""
+    """A flight through impacts, from an undisturbed one that would lead to `ends`.
+
+    After an impact the row flies on with the forces of its system and a push (gx, gy, gz) [m/s2].
+    """
     fly, total = module["fly"], module["total"]
     solids, scene, threatened = solid["solids"], solid["scene"], solid["threatened"]
     encounter, moving = encounter_kernel(solid, surfaces, inertial), surfaces.moving
 
     @jit(flags=EXACT, inline=True)
-    def flight(x, y, z, vx, vy, vz, born, t, end, C, K, KS):  # type: ignore[no-untyped-def]
+    def flight(x, y, z, vx, vy, vz, ends, born, t, end, C, K, KS, gx, gy, gz):  # type: ignore[no-untyped-def]
         # Not literals, for which Numba would compile `encounter` once more.
         hits, resting = np.int64(0), np.bool_(False)
+        a, b, c, va, vb, vc = ends
         D = solids(scene(KS, t))
+        E = solids(scene(KS, end)) if moving else D
+        if not threatened(D, E, x, y, z, vx, vy, vz, a, b, c, va, vb, vc, end - t):
+            return a, b, c, va, vb, vc, hits
         while t < end:
-            h = end - t
-            a, b, c, va, vb, vc = fly(x, y, z, vx, vy, vz, born, t, h, C, K)
-            if hits == 0 and not resting:
-                E = solids(scene(KS, end)) if moving else D
-                if not threatened(D, E, x, y, z, vx, vy, vz, a, b, c, va, vb, vc, h):
-                    return a, b, c, va, vb, vc, hits
             w0 = total(x, y, z, vx, vy, vz, born, t, C, K)
             w1 = total(a, b, c, va, vb, vc, born, end, C, K)
             x, y, z, vx, vy, vz, t, hits, resting = encounter(
@@ -130,6 +170,12 @@ def _flight(
             )
             u = total(x, y, z, 0.0, 0.0, 0.0, born, t, C, K)
             vx, vy, vz = vx - u[0], vy - u[1], vz - u[2]
+            if t < end:
+                h = end - t
+                a, b, c, va, vb, vc = fly(x, y, z, vx, vy, vz, born, t, h, C, K)
+                m = 0.5 * h * h
+                a, b, c = a + m * gx, b + m * gy, c + m * gz
+                va, vb, vc = va + h * gx, vb + h * gy, vc + h * gz
         return x, y, z, vx, vy, vz, hits
 
     return flight

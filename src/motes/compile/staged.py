@@ -9,6 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 from motes.compile.motion import Motion
+from motes.compile.straight import THREATENED
+from motes.compile.surfaces import Surfaces
 from motes.compile.text import AXES, STATE, Text
 from motes.jit import jit
 from motes.tableau import Splitting
@@ -28,12 +30,13 @@ def write_staged(text: Text, motion: Motion) -> None:
     begin = f"    for i in range(x.size):\n        age, C = F(t - born[i]), {carried}\n"
     call = f"({row}, age, C, S, L, now)"
     pushed = f"        ax, ay, az, r, bx, by, bz = pushed{call}\n"
+    pushed += "".join(f"        a{a} += g{a}[i]\n" for a in AXES)
+    if motion.limits:
+        pushed += f"        ax, ay, az = limited{call[:-1]}, ax, ay, az)\n"
     flows = f"        ux, uy, uz = carried{call}\n" if motion.flows else ""
     if isinstance(motion.method, Splitting):
         change = "        g = phi1(r * h) * h\n" if motion.relaxes else "        g = h\n"
-        change += "".join(
-            f"        v{a}[i] += g * (a{a} + b{a} + g{a}[i] - r * v{a}[i])\n" for a in AXES
-        )
+        change += "".join(f"        v{a}[i] += g * (a{a} + b{a} - r * v{a}[i])\n" for a in AXES)
         head = "(Y, birth, columns, push, K, t, dt, lo, hi):\n    h = F(dt)\n"
         text.add(f"@kernel\ndef kick{head}{slices}{begin}{pushed}{change}")
         text.add(f"@kernel\ndef drift{head}{slices}{begin}{_drift(motion, flows, row)}")
@@ -41,11 +44,29 @@ def write_staged(text: Text, motion: Motion) -> None:
     outputs = "".join(f"    k{n} = slope_[{k}][lo:hi]\n" for k, n in enumerate(STATE))
     change = "".join(
         f"        k{a}[i] = v{a}[i]{f' + u{a}' if flows else ''}\n"
-        f"        kv{a}[i] = a{a} + b{a} + g{a}[i] - r * v{a}[i]\n"
+        f"        kv{a}[i] = a{a} + b{a} - r * v{a}[i]\n"
         for a in AXES
     )
     head = "@kernel\ndef slope(Y, birth, columns, push, slope_, K, t, lo, hi):\n"
     text.add(head + slices + outputs + begin + flows + pushed + change)
+
+
+def write_threats(text: Text, surfaces: Surfaces) -> None:
+    """Write `threats`, which flags rows that may meet a solid on the way from a state to Y."""
+    slices = "".join(
+        f"    {n}, n{n} = {'velocity' if n.startswith('v') else 'position'}[{k % 3}][lo:hi], "
+        f"Y[{k}][lo:hi]\n"
+        for k, n in enumerate(STATE)
+    )
+    row, ends = (", ".join(f"{m}{n}[i]" for n in STATE) for m in ("", "n"))
+    moved = "D0, solids(scene(K, end))" if surfaces.moving else "D0, D0"
+    text.add(
+        "@kernel\ndef threats(position, velocity, Y, flags, K, t, end, lo, hi):\n"
+        f"{slices}    D0 = solids(scene(K, t))\n    D0, D1 = {moved}\n"
+        "    flag, h = flags[lo:hi], F(end - t)\n    for i in range(x.size):\n"
+        f"        flag[i] = uint8({THREATENED}) if threatened(D0, D1, {row}, {ends}, h) "
+        "else uint8(0)\n"
+    )
 
 
 def _drift(motion: Motion, flows: str, row: str) -> str:

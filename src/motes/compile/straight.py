@@ -23,28 +23,35 @@ def write_straight(text: Text, motion: Motion, surfaces: Surfaces | None) -> Non
     if not text.values.varies_in_time:
         _write_step(text, motion, surfaces, loop, young=True)
     if motion.mortal:
-        text.add(
-            f"@kernel\ndef retire{HEAD}{loop.slices}    flag = flags[lo:hi]\n"
-            "    S, now = scene(K, t), F(t)\n    for i in range(x.size):\n"
-            f"        age, C = F(t - born[i]), {loop.columns}\n"
-            f"        flag[i] = dies({loop.row}, age, C, S, L, now)\n"
-        )
+        _write_retire(text, loop)
 
 
-HEAD = "(position, velocity, birth, columns, flags, K, t, dt, lo, hi):\n"
+HEAD = "(position, velocity, birth, columns, flags, K, t, end, lo, hi):\n"
+
+CHUNK = 1024
+"""Rows that are prepared at once. Their ages are found before the main loop, whose SIMD width a
+double would halve. Their old state is put aside where rows may be left as they were: to store only
+some rows of a SIMD register is slow."""
+
+DEAD, THREATENED = 1, 2
+"""What a row's flag says."""
 
 
 class _Loop:
     """What every loop over rows says."""
 
     def __init__(self, text: Text, motion: Motion) -> None:
-        names = [f"c{i}" for i in range(sum(c.width for c in text.values.columns))]
+        self.names = [f"c{i}" for i in range(sum(c.width for c in text.values.columns))]
         self.state = STATE if motion.inertial else AXES
-        self.slices = "".join(f"    {n} = {_block(n)}[lo:hi]\n" for n in self.state)
-        self.slices += "".join(f"    {n} = columns[{i}][lo:hi]\n" for i, n in enumerate(names))
-        self.slices += "    born = birth[lo:hi]\n    constants, offsets, splines, L = K\n"
         self.row = ", ".join(f"{n}[i]" if n in self.state else "F(0.0)" for n in STATE)
-        self.columns = f"({''.join(f'{n}[i], ' for n in names) or 'F(0.0),'})"
+        self.columns = f"({''.join(f'{n}[i], ' for n in self.names) or 'F(0.0),'})"
+
+    def slices(self, low: str, high: str, indent: str) -> str:
+        """Source that cuts the columns to a range of rows."""
+        parts = [(n, _block(n)) for n in self.state]
+        parts += [(n, f"columns[{i}]") for i, n in enumerate(self.names)]
+        parts.append(("born", "birth"))
+        return "".join(f"{indent}{n} = {array}[{low}:{high}]\n" for n, array in parts)
 
 
 def _write_step(
@@ -52,31 +59,84 @@ def _write_step(
 ) -> None:
     places = stage_times(motion.method)
     stages = range(len(places))
-    slices, prelude, body = loop.slices, "", "    for i in range(x.size):\n"
+    aged = not young and ("life" in text.values.over or "age" in motion.needs())
+    outlived = young or motion.mortal
+    prelude = "    constants, offsets, splines, L = K\n    dt = end - t\n"
     if young:
-        prelude += "    S = scene(K, t)\n"
-        body += "        h, age = F(t + dt - born[i]), F(0.0)\n"
-        body += "".join(f"        t{i} = F(born[i]) + F({p!r}) * h\n" for i, p in enumerate(places))
-        scene = ", ".join("S" for _ in stages)
+        prelude += "    S, now = scene(K, t), F(end)\n"
+        body = "            h, age = old[i], F(0.0)\n"
+        body += "".join(
+            f"            t{i} = F(born[i]) + F({p!r}) * h\n" for i, p in enumerate(places)
+        )
+        scene, after = ", ".join("S" for _ in stages), "S"
     else:
-        prelude += "    h = F(dt)\n"
+        prelude += "    h, now, S = F(dt), F(end), scene(K, end)\n"
         for i, place in enumerate(places):
             prelude += (
                 f"    t{i} = F(t + {place!r} * dt)\n    S{i} = scene(K, t + {place!r} * dt)\n"
             )
-        body += "        age = F(t - born[i])\n"
-        scene = ", ".join(f"S{i}" for i in stages)
+        body = f"            age = {'ages[i]' if aged else 'F(0.0)'}\n"
+        scene, after = ", ".join(f"S{i}" for i in stages), "S"
     times, ends = ", ".join(f"t{i}" for i in stages), ", ".join(END)
-    body += f"        {ends} = advance({loop.row}, age, {loop.columns}, {scene}, L, {times}, h)\n"
+    call = f"{loop.row}, age, C, {scene}, L, {times}, h"
+    body += f"            C = {loop.columns}\n            {ends} = advance({call})\n"
+    marks = []
     if surfaces is not None:
-        slices += "    flag = flags[lo:hi]\n"
-        prelude += "    D0, D1 = solids(scene(K, t)), solids(scene(K, t + dt))\n"
-        body += f"        meets = threatened(D0, D1, {loop.row}, {ends}, h)\n"
-        body += "".join(f"        {n}[i] = {n}[i] if meets else n{n}\n" for n in loop.state)
-        body += "        flag[i] = meets\n"
-    else:
-        body += "".join(f"        {n}[i] = n{n}\n" for n in loop.state)
-    text.add(f"@kernel\ndef {'young' if young else 'straight'}{HEAD}{slices}{prelude}{body}")
+        prelude += "    D0, D1 = solids(scene(K, t)), solids(scene(K, end))\n"
+        body += f"            meets = threatened(D0, D1, {loop.row}, {ends}, h)\n"
+        marks.append(f"uint8({THREATENED}) * uint8(meets)")
+    body += "".join(f"            {n}[i] = n{n}\n" for n in loop.state)
+    if motion.mortal:
+        body += f"            gone = dies({ends}, old[i], C, {after}, L, now)\n"
+        marks.append(f"uint8({DEAD}) * uint8(gone)")
+    if marks:
+        body += f"            flag[i] = uint8({' | '.join(marks)})\n"
+    found = ""
+    for name, time, wanted in (("ages", "t", aged), ("old", "end", outlived)):
+        if wanted:
+            prelude += f"    room_of_{name} = empty({CHUNK}, F)\n"
+            found += f"        {name} = room_of_{name}[: high - low]\n"
+            found += (
+                f"        for i in range(born.size):\n            {name}[i] = F({time} - born[i])\n"
+            )
+    undo = ""
+    if surfaces is not None:
+        for n in loop.state:
+            prelude += f"    room_of_{n} = empty({CHUNK}, F)\n"
+            found += f"        old_{n} = room_of_{n}[: high - low]\n"
+        copies, back = (
+            "".join(f"{indent}{to}[i] = {of}[i]\n" for to, of in pairs)
+            for indent, pairs in (
+                (" " * 12, [(f"old_{n}", n) for n in loop.state]),
+                (" " * 20, [(n, f"old_{n}") for n in loop.state]),
+            )
+        )
+        found += f"        for i in range(x.size):\n{copies}"
+        undo = (
+            "        seen = 0\n        for i in range(flag.size):\n            seen |= flag[i]\n"
+            f"        if seen & {THREATENED}:\n            for i in range(flag.size):\n"
+            f"                if flag[i] & {THREATENED}:\n{back}"
+        )
+    text.add(
+        f"@kernel\ndef {'young' if young else 'straight'}{HEAD}{prelude}"
+        f"    for low in range(lo, hi, {CHUNK}):\n"
+        f"        high = min(low + {CHUNK}, hi)\n"
+        f"{loop.slices('low', 'high', ' ' * 8)}        flag = flags[low:high]\n"
+        f"{found}        for i in range(x.size):\n{body}{undo}"
+    )
+
+
+def _write_retire(text: Text, loop: _Loop) -> None:
+    """Write `retire`, which flags the dead among given rows: those that took no straight path."""
+    text.add(
+        "@kernel\ndef retire(position, velocity, birth, columns, flags, K, t, rows):\n"
+        f"{loop.slices('', '', ' ' * 4)}"
+        "    constants, offsets, splines, L = K\n"
+        "    S, now = scene(K, t), F(t)\n    for r in range(rows.size):\n"
+        f"        i = rows[r]\n        age, C = F(t - born[i]), {loop.columns}\n"
+        f"        gone = dies({loop.row}, age, C, S, L, now)\n"
+        f"        flags[i] = uint8({DEAD}) if gone else uint8(0)\n"
+    )
 
 
 def _block(name: str) -> str:
@@ -90,7 +150,8 @@ def write_potentials(text: Text, motion: Motion) -> None:
     loop = _Loop(text, motion)
     text.add(
         "@kernel\ndef potentials(position, velocity, birth, columns, K, t, out, lo, hi):\n"
-        f"{loop.slices}    phi, S, now = out[lo:hi], scene(K, t), F(t)\n"
+        f"{loop.slices('lo', 'hi', ' ' * 4)}    constants, offsets, splines, L = K\n"
+        "    phi, S, now = out[lo:hi], scene(K, t), F(t)\n"
         "    for i in range(x.size):\n"
         f"        age, C = F(t - born[i]), {loop.columns}\n"
         f"        phi[i] = potential({loop.row}, age, C, S, L, now)\n"

@@ -16,9 +16,14 @@ from numpy.typing import NDArray
 
 from motes.catalog import Component
 from motes.compile.births import Channels, births_kernel, write_draws, write_emitter
-from motes.compile.impacts import currents_kernel, exceptions_kernel, write_flight
+from motes.compile.impacts import (
+    currents_kernel,
+    exceptions_kernel,
+    rebounds_kernel,
+    write_flight,
+)
 from motes.compile.motion import KEPT, Motion, write_motion
-from motes.compile.staged import write_staged
+from motes.compile.staged import write_staged, write_threats
 from motes.compile.straight import write_potentials, write_straight
 from motes.compile.surfaces import Surfaces, write_surfaces
 from motes.compile.text import Text
@@ -45,7 +50,7 @@ class CompiledSystem:
         self, motion: Motion, solids: Addressed, emitters: Addressed, precision: str, strict: bool
     ) -> None:
         self.motion = motion
-        hard = [(a, s) for a, s in solids if s.values["collides"].document()]
+        hard = self._hard = [(a, s) for a, s in solids if s.values["collides"].document()]
         self.fast = Text(precision, strict)
         write_motion(self.fast, motion)
         self.surfaces = self._solid(self.fast, hard)
@@ -98,7 +103,7 @@ class CompiledSystem:
 
     @property
     def retire(self) -> Any:
-        """Kernel: flags the rows that die."""
+        """Kernel: flags the dead among rows that took no straight path."""
         return self._fast_module["retire"]
 
     @cached_property
@@ -106,11 +111,14 @@ class CompiledSystem:
         text = Text(self.fast.precision, self._strict)
         write_motion(text, self.motion)
         write_staged(text, self.motion)
+        surfaces = self._solid(text, self._hard)
+        if surfaces is not None:
+            write_threats(text, surfaces)
         text.add(text.values.scene_text())
         return text.module(), text.values.arrays(text.real)
 
     def staged(self, name: str) -> Any:
-        """Kernel `slope`, `kick` or `drift`, for systems that are part of a group."""
+        """Kernel `slope`, `kick`, `drift` or `threats`, for systems that are part of a group."""
         return self._staged_module[0][name]
 
     @property
@@ -128,6 +136,12 @@ class CompiledSystem:
         return exceptions_kernel(
             self._exact_module, self.solid.module(), self.motion, self.surfaces
         )
+
+    @cached_property
+    def rebounds(self) -> Any:
+        """Kernel: given rows of a group through their impacts."""
+        assert self.surfaces is not None
+        return rebounds_kernel(self._exact_module, self.solid.module(), self.motion, self.surfaces)
 
     def potential(self, particles: Particles, time: float) -> NDArray[np.float64]:
         """Potential (n,) [m2/s2] of the forces that have one, at each particle."""

@@ -108,6 +108,8 @@ class Text:
         scope: dict[str, Any] = {
             "__name__": __name__,  # Cached machine code is rebuilt in an importable module.
             "F": self.real,
+            "uint8": np.uint8,
+            "empty": np.empty,
             "inline": lambda f: jit(f, flags=flags, inline=True),
             "kernel": lambda f: jit(f, flags=flags),
             "lookup": _lookup(self.real, flags),

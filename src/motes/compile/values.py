@@ -2,7 +2,8 @@
 
 A constant is one entry of `constants`, so that changing it compiles nothing. A curve over time is a
 packed spline, evaluated exactly at the time at which it is asked. A value drawn at birth is a
-column of the system. A curve over life or speed is a row of a lookup table.
+column of the system. A curve over life or speed is a function of its pieces' polynomials, unless it
+has so many that a row of a lookup table is cheaper.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from motes.control.constant import Constant, Setting
 from motes.control.control import Control
 from motes.control.curve import TABLE_SIZE, Curve
+from motes.control.pieces import Pieces, pieces
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,8 @@ class Values:
     columns: list[Column] = field(default_factory=list)
     scene: list[str] = field(default_factory=list)
     over: set[str] = field(default_factory=set)
+    curves: list[str] = field(default_factory=list)
+    """Source of the functions of curves over life and speed."""
 
     def constant(self, value: float) -> str:
         """An entry of `constants` as an element of S."""
@@ -81,7 +85,7 @@ class Values:
         if control.scope in ("birth", "scene"):
             return self._column(Column(address, control, shown))
         assert isinstance(control, Curve)
-        return self._table(control)
+        return self._varying(control)
 
     def _column(self, column: Column) -> list[str]:
         start = 0
@@ -93,23 +97,49 @@ class Values:
             self.columns.append(column)
         return [f"C[{start + i}]" for i in range(column.width)]
 
-    def _table(self, control: Curve) -> list[str]:
+    def _varying(self, control: Curve) -> list[str]:
+        """A curve over life or speed, in pieces or from a table."""
         self.over.add(control.over)
         low, high = control.span
-        if control.over == "life":
-            place = "along_life"
-        else:
+        place = "along_life" if control.over == "life" else "speed"
+        found = pieces(control.spline, low, high)
+        if found is not None:
+            return [f"{name}(S, {place})" for name in self._pieces(found)]
+        if control.over == "speed":
             scale = self.constant(1.0 / max(high - low, 1e-30))
             place = f"(speed - {self.constant(low)}) * {scale}"
         first = len(self.tables)
         self.tables += list(control.table().T)
         return [f"lookup(L, {first + i}, {place})" for i in range(control.width)]
 
+    def _pieces(self, found: Pieces) -> list[str]:
+        """Write a function of S and the place for each component of a curve; returns their names.
+
+        Places and lengths are shared by the components, so that machine code clamps once.
+        """
+        places = [self.constant(start) for start in found.starts]
+        lengths = [self.constant(length) for length in found.lengths]
+        names = []
+        for component, first in enumerate(found.first):
+            lines = f"    v = {self.constant(first)}\n"
+            for k, (place, length) in enumerate(zip(places, lengths, strict=True)):
+                if k and found.jumps_anywhere:
+                    jump = self.constant(found.jumps[k, component])
+                    lines += f"    v += {jump} if u >= {place} else F(0.0)\n"
+                sums = ""
+                for rise in reversed(found.rises[k, :, component]):
+                    sums = f"w * ({self.constant(rise)}{' + ' if sums else ''}{sums})"
+                if sums:
+                    lines += f"    w = min(max(u - {place}, F(0.0)), {length})\n    v += {sums}\n"
+            names.append(f"curve_{len(self.curves)}")
+            self.curves.append(f"@inline\ndef {names[-1]}(S, u):\n{lines}    return v\n")
+        return names
+
     def scene_text(self) -> str:
-        """Source of `scene(K, t)`: the tuple S at a time."""
+        """Source of `scene(K, t)`, the tuple S at a time, and of the curves that read it."""
         entries = "".join(f"{e}, " for e in self.scene) or "F(0.0),"
-        return (
-            "@inline\n"
+        return "\n\n".join(self.curves) + (
+            "\n\n@inline\n"
             "def scene(K, t):\n"
             "    constants, offsets, splines, L = K\n"
             f"    return ({entries})\n"

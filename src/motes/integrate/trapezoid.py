@@ -1,5 +1,16 @@
-"""The implicit trapezoid (Crank and Nicolson): second order, A-stable; rings on stiff decays."""
+"""The implicit trapezoid (Crank and Nicolson): second order, A-stable; rings on stiff decays.
+
+The error estimate is Simpson's rule, third order, on the cubic through both ends of the step; its
+stage costs nothing where steps are fixed.
+"""
 
 from motes.tableau import Implicit
 
-method = Implicit(order=2, c=(0, 1), a=((0, 0), (1 / 2, 1 / 2)), b=(1 / 2, 1 / 2))
+method = Implicit(
+    order=2,
+    c=(0, 1, 1 / 2),
+    a=((0, 0, 0), (1 / 2, 1 / 2, 0), (3 / 8, 1 / 8, 0)),
+    b=(1 / 2, 1 / 2, 0),
+    b_low=(1 / 6, 1 / 6, 2 / 3),
+    low_order=3,
+)

@@ -226,7 +226,7 @@ def _around(cell: Any, count: Any, wraps: Any) -> Any:
 
 
 @jit(inline=True)
-def _first_from(key: Any, cells: Any) -> Any:
+def first_from(key: Any, cells: Any) -> Any:
     """The first point whose cell's number is not below `key`."""
     entry = np.intp(key >> cells.shift)
     if entry >= cells.first.size - 1:
@@ -271,8 +271,8 @@ def runs_around(key: Any, grid: Any, cells: Any, runs: Any) -> Any:
             begin, left = x, nx_around
             while left > 0:
                 length = min(left, nx - begin)
-                low = _first_from(np.uint64(row + begin), cells)
-                high = _first_from(np.uint64(row + begin + length), cells)
+                low = first_from(np.uint64(row + begin), cells)
+                high = first_from(np.uint64(row + begin + length), cells)
                 if low < high:
                     runs[number, 0], runs[number, 1] = low, high
                     number += 1

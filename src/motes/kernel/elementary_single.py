@@ -65,7 +65,7 @@ def reduced_exp(x: Any) -> tuple[Any, Any]:
     rounded = x * LOG2_E + ROUND
     n = rounded - ROUND
     q = small_exp((x - n * LN2_HIGH) - n * LN2_LOW)
-    return q, np.float32(rounded).view(np.int32) - ROUND_BITS
+    return q, np.int32(np.float32(rounded).view(np.int32) - ROUND_BITS)
 
 
 def scaled(x: Any, k: Any) -> Any:
@@ -87,9 +87,9 @@ def exp(x: Any) -> Any:
 
 def one_minus_exp(z: Any) -> Any:
     """1 - exp(-z) for z >= 0, without cancellation near 0."""
-    x = Real(-104) if z > Real(104) else -z
+    x = Real(-87) if z > Real(87) else -z  # Where the difference from 1 is long gone.
     q, k = reduced_exp(x)
-    scale = scaled(ONE, k)
+    scale = np.int32(np.int32(k + np.int32(127)) << np.int32(23)).view(np.float32)
     return (ONE - scale) - scale * q
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,24 +16,61 @@ Kernel = Any
 """A compiled function; Numba has no types that mypy could know."""
 
 
-def combination(rows: Sequence[Sequence[float]]) -> Kernel:
-    """combine(row, y, k, h, out): out = y + h sum_j rows[row][j] k[j].
+class Sum(NamedTuple):
+    """w[target] = w[base] + h sum weight_j w[j], rows of a march's memory; base None: 0."""
 
-    The numbers stand in the machine code, each sum is one pass, and zeros are left out: with rows
-    as arrays the same takes twice as long.
+    target: int
+    base: int | None
+    weights: Sequence[tuple[int, float]]
+
+
+def sums(lines: Sequence[Sum], rows: int, size: int | None) -> Kernel:
+    """combine(number, w, h): the sum of that number, in memory w of `rows` rows of `size` numbers.
+
+    The numbers stand in the machine code, each sum is one pass, and zeros are left out: with
+    weights as arrays the same takes twice as long. Without a size it serves states of any.
     """
-    lines = ["def combine(row, y, k, h, out):", "    pass"]
-    for number, row in enumerate(rows):
-        terms = [f"{float(weight)!r} * k[{j}, i]" for j, weight in enumerate(row) if weight]
-        if terms:
-            lines += [
-                f"    if row == {number}:",
-                "        for i in range(out.size):",
-                f"            out[i] = y[i] + h * ({' + '.join(terms)})",
-            ]
-    names: dict[str, Any] = {"__name__": __name__}
-    exec("\n".join(lines), names)
-    return jit(names["combine"])
+    text = ["def combine(number, w, h):", f"    n = {size or f'w.size // {rows}'}"]
+    for number, line in enumerate(lines):
+        text += [
+            f"    if number == {number}:",
+            "        for i in range(n):",
+            f"            w[{line.target} * n + i] = {_sum(line)}",
+        ]
+    return _kernel("combine", text, inline=size is not None)
+
+
+def estimate(sums: Sequence[Sum], rows: int, size: int | None) -> Kernel:
+    """sizes(w, h, rtol, atol): norms of one or two error estimates in one pass.
+
+    The norm is the root mean square over atol + rtol max(|y|, |y1|); the first estimate itself goes
+    to its target. With one estimate, the second norm is 0.
+    """
+    text = ["def sizes(w, h, rtol, atol):", f"    n = {size or f'w.size // {rows}'}"]
+    text += ["    first, second = 0.0, 0.0", "    for i in range(n):"]
+    text += [
+        f"        e = {_sum(sums[0])}",
+        f"        w[{sums[0].target} * n + i] = e",
+        "        before, after = abs(w[i]), abs(w[n + i])",
+        "        scale = 1.0 / (atol[i] + rtol * (before if before > after else after))",
+        "        first += (e * scale) ** 2",
+    ]
+    if len(sums) > 1:
+        text.append(f"        second += ({_sum(sums[1])} * scale) ** 2")
+    text.append("    return math.sqrt(first / n), math.sqrt(second / n)")
+    return _kernel("sizes", text, inline=size is not None)
+
+
+def _sum(line: Sum) -> str:
+    terms = [f"{float(x)!r} * w[{row} * n + i]" for row, x in line.weights if x]
+    moved = f"h * ({' + '.join(terms) or '0.0'})"
+    return moved if line.base is None else f"w[{line.base} * n + i] + {moved}"
+
+
+def _kernel(name: str, text: list[str], *, inline: bool) -> Kernel:
+    names: dict[str, Any] = {"__name__": __name__, "math": math}
+    exec("\n".join(text), names)
+    return jit(names[name], inline=inline)
 
 
 @jit
@@ -48,13 +85,6 @@ def add(x: Array, h: float, v: Array, out: Array) -> None:
     """out = x + h v."""
     for i in range(x.size):
         out[i] = x[i] + h * v[i]
-
-
-@jit
-def clear(out: Array) -> None:
-    """out = 0."""
-    for i in range(out.size):
-        out[i] = 0.0
 
 
 @jit
@@ -89,26 +119,27 @@ def first_infinite(y: Array) -> int:
 
 
 @jit
-def hermite(y: Array, end: Array, k: Array, h: float, rows: Array) -> None:
-    """The interpolant's rows D, F1, F2 of `motes.tableau.Explicit`, from both ends."""
-    last = k.shape[0] - 1
-    for i in range(y.size):
-        d = end[i] - y[i]
-        rows[0, i] = d
-        rows[1, i] = h * k[0, i] - d
-        rows[2, i] = 2.0 * d - h * (k[0, i] + k[last, i])
+def hermite(w: Array, n: int, last: int, spare: int, h: float) -> None:
+    """The interpolant's rows D, F1, F2 of `motes.tableau.Explicit`, from both ends of the step.
+
+    `last` is the row of the slope at the end, `spare` the first of the three.
+    """
+    for i in range(n):
+        d = w[n + i] - w[i]
+        w[spare * n + i] = d
+        w[(spare + 1) * n + i] = h * w[2 * n + i] - d
+        w[(spare + 2) * n + i] = 2.0 * d - h * (w[2 * n + i] + w[last * n + i])
 
 
 @jit
-def interpolate(y: Array, rows: Array, share: float, out: Array) -> None:
-    """The interpolant at a share of the step, from its rows."""
+def interpolate(w: Array, n: int, spare: int, count: int, share: float, out: Array) -> None:
+    """The interpolant at a share of the step, from its `count` rows."""
     rest = 1.0 - share
-    top = rows.shape[0] - 1
-    for i in range(y.size):
-        out[i] = rows[top, i]
-    for m in range(top - 1, -1, -1):
+    for i in range(n):
+        out[i] = w[(spare + count - 1) * n + i]
+    for m in range(count - 2, -1, -1):
         factor = rest if m % 2 == 0 else share
-        for i in range(y.size):
-            out[i] = rows[m, i] + factor * out[i]
-    for i in range(y.size):
-        out[i] = y[i] + share * out[i]
+        for i in range(n):
+            out[i] = w[(spare + m) * n + i] + factor * out[i]
+    for i in range(n):
+        out[i] = w[i] + share * out[i]

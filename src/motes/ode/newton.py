@@ -7,12 +7,12 @@ import math
 import numpy as np
 
 from motes.ode.arithmetic import Kernel, add, copy
-from motes.ode.march import Pieces, partial_step
+from motes.ode.march import FIRST_SLOPE, Pieces, Room, partial_step
 from motes.ode.right_hand_side import Wrap
 from motes.tableau import Nystrom, Splitting
 
-SLOPES = 2
-"""Rows of k that a splitting needs: the acceleration at the start and at the end of the step."""
+SPLITTING = Room(1, 1)
+"""Slopes: the acceleration at the start of the step, or at its end; spare: that of other kicks."""
 
 
 def splitting(
@@ -29,32 +29,35 @@ def splitting(
     reuse = conservative and table.kicks[0] != 0 and table.kicks[-1] != 0
 
     @wrap.part
-    def begin(t, y, k, args):  # type: ignore[no-untyped-def]
+    def begin(t, y, w, args):  # type: ignore[no-untyped-def]
         if reuse:
             n = y.size // 2
-            acceleration(t, y[:n], y[n:], k[0][:n], args)
+            acceleration(t, y[:n], y[n:], w[4 * n : 5 * n], args)
             return 1
         return 0
 
     @wrap.part
-    def take(t, y, k, end, h, args):  # type: ignore[no-untyped-def]
+    def take(t, y, end, w, h, args):  # type: ignore[no-untyped-def]
         n = y.size // 2
         copy(y, end)
-        x, v = end[:n], end[n:]
+        x, v, first, a = end[:n], end[n:], w[4 * n : 5 * n], w[6 * n : 7 * n]
         evaluations = 0
         for i in range(count):
             if kicks[i] != 0.0:
-                a = k[0][:n]
-                if i > 0 or not reuse:
-                    a = k[1][:n]
+                if i == 0 and reuse:
+                    kick(v, first, kicks[i] * h, args)
+                else:
                     acceleration(t + times[i] * h, x, v, a, args)
                     evaluations += 1
-                kick(v, a, kicks[i] * h, args)
+                    kick(v, a, kicks[i] * h, args)
             add(x, drifts[i] * h, v, x)
         return evaluations
 
     @wrap.part
-    def close(t, end, k, args):  # type: ignore[no-untyped-def]
+    def close(t, end, w, args):  # type: ignore[no-untyped-def]
+        if reuse:
+            n = end.size // 2
+            copy(w[6 * n : 7 * n], w[4 * n : 5 * n])
         return 0
 
     kick = _kick(wrap, drag)
@@ -71,28 +74,28 @@ def nystrom(table: Nystrom, acceleration: Kernel, wrap: Wrap) -> Pieces:
     times = np.array(table.c, float)
 
     @wrap.part
-    def begin(t, y, k, args):  # type: ignore[no-untyped-def]
+    def begin(t, y, w, args):  # type: ignore[no-untyped-def]
         return 0
 
     @wrap.part
-    def take(t, y, k, end, h, args):  # type: ignore[no-untyped-def]
+    def take(t, y, end, w, h, args):  # type: ignore[no-untyped-def]
         n = y.size // 2
-        x, v = end[:n], end[n:]
+        x, v, k = end[:n], end[n:], w[2 * FIRST_SLOPE * n :]
         for i in range(stages):
             add(y[:n], times[i] * h, y[n:], x)
             copy(y[n:], v)
             for j in range(i):
-                add(x, a[i, j] * h * h, k[j][:n], x)
-            acceleration(t + times[i] * h, x, v, k[i][:n], args)
+                add(x, a[i, j] * h * h, k[2 * j * n : (2 * j + 1) * n], x)
+            acceleration(t + times[i] * h, x, v, k[2 * i * n : (2 * i + 1) * n], args)
         add(y[:n], h, y[n:], x)
         copy(y[n:], v)
         for j in range(stages):
-            add(x, b_position[j] * h * h, k[j][:n], x)
-            add(v, b[j] * h, k[j][:n], v)
+            add(x, b_position[j] * h * h, k[2 * j * n : (2 * j + 1) * n], x)
+            add(v, b[j] * h, k[2 * j * n : (2 * j + 1) * n], v)
         return stages
 
     @wrap.part
-    def close(t, end, k, args):  # type: ignore[no-untyped-def]
+    def close(t, end, w, args):  # type: ignore[no-untyped-def]
         return 0
 
     return Pieces(begin, take, close, _no_error(wrap), *partial_step(take, wrap))
@@ -102,8 +105,8 @@ def _no_error(wrap: Wrap) -> Kernel:
     """The error estimate of methods that have none; `solve_newton` lets them take fixed steps."""
 
     @wrap.part
-    def error(t, y, end, k, h, rows, rtol, atol):  # type: ignore[no-untyped-def]
-        return 0.0
+    def error(t, y, end, w, h, rtol, atol, args):  # type: ignore[no-untyped-def]
+        return 0.0, 0
 
     return error
 

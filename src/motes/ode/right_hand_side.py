@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -38,32 +39,33 @@ def wrap(functions: Sequence[Function]) -> Wrap:
 
 
 def slope(f: Function, shape: tuple[int, ...]) -> Kernel:
-    """slope(t, y, out, args): out = f(t, y in its shape, *args), from an array or a tuple."""
+    """slope(t, y, w, row, args): a row of w becomes f(t, y in its shape, *args)."""
+    size = math.prod(shape)
     if not compiled(f):
 
-        def call(t, y, out, args):  # type: ignore[no-untyped-def]
-            out[:] = np.asarray(f(t, y.reshape(shape), *args)).reshape(-1)
+        def call(t, y, w, row, args):  # type: ignore[no-untyped-def]
+            value = np.asarray(f(t, y.reshape(shape), *args))
+            w[row * size : (row + 1) * size] = value.reshape(-1)
 
         return call
     f = _fused(f)
     if not shape:
 
-        def number(t, y, out, args):  # type: ignore[no-untyped-def]
-            out[0] = f(t, y[0], *args)
+        def number(t, y, w, row, args):  # type: ignore[no-untyped-def]
+            w[row] = f(t, y[0], *args)
 
         return jit(number)
     if len(shape) == 1:
-        size = shape[0]
 
-        def vector(t, y, out, args):  # type: ignore[no-untyped-def]
+        def vector(t, y, w, row, args):  # type: ignore[no-untyped-def]
             value = f(t, y, *args)
             for i in range(size):
-                out[i] = value[i]
+                w[row * size + i] = value[i]
 
         return jit(vector)
 
-    def block(t, y, out, args):  # type: ignore[no-untyped-def]
-        out[:] = f(t, y.reshape(shape), *args).ravel()
+    def block(t, y, w, row, args):  # type: ignore[no-untyped-def]
+        w[row * size : (row + 1) * size] = f(t, y.reshape(shape), *args).ravel()
 
     return jit(block)
 
@@ -138,7 +140,7 @@ def _fused(f: Any) -> Kernel:
     One that asks for more, such as parallel loops, checks of bounds or fast arithmetic, stays.
     """
     asked = {name for name, value in f.targetoptions.items() if value}
-    return jit(f.py_func, flags=EXACT) if asked <= _PLAIN_OPTIONS else f
+    return jit(f.py_func, flags=EXACT, inline=True) if asked <= _PLAIN_OPTIONS else f
 
 
 _PLAIN_OPTIONS = {"nopython", "error_model", "nogil", "cache"}

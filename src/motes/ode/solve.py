@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from motes.integrate import table as find
 from motes.ode import explicit, implicit, right_hand_side
 from motes.ode.arithmetic import Array
-from motes.ode.jacobian import Linearisation, Newton
+from motes.ode.implicit import EXACTLY
+from motes.ode.jacobian import Newton, NewtonKey
 from motes.ode.march import Control
 from motes.ode.run import Machine, March, as_events, asked, checked, ends, fixed
 from motes.ode.solution import Event, Solution
@@ -76,22 +77,23 @@ def solve(
     shape = start.shape
     watched = as_events(events)
     table = find(method)
-    tolerances = np.broadcast_to(np.asarray(atol, float), shape).reshape(-1).copy()
+    tolerances = _tolerances(atol, shape)
     if step is not None:
         control = fixed(span, step, max_steps)
     else:
-        control = _adaptive(method, table, span, rtol, tolerances, largest_step, max_steps)
+        control = _adaptive(method, table, span, rtol, atol, largest_step, max_steps)
     functions = tuple(event.function for event in watched)
+    inner: tuple[Array | float, float] | None = None
     if isinstance(table, Implicit | Rosenbrock | BackwardDifference):
-        near = Linearisation(_flat(f, shape, args), newton or Newton(), tuple(args), start.size)
-        solver = implicit.Solver(near, control.rtol, tolerances if step is None else _unit(start))
-        watch = right_hand_side.watcher(functions, shape, right_hand_side.PLAIN)
-        machine = Machine.build(*implicit.pieces(table, solver), watch, right_hand_side.PLAIN)
+        machine = _implicit(f, shape, method, functions, (newton or Newton()).key(start.size))
+        inner = (tolerances * 0.01, control.rtol * 0.01)
+        if step is not None:
+            inner = _size(start) * EXACTLY, EXACTLY
     else:
-        machine = _machine(f, shape, method, functions)
+        machine = _explicit(f, shape, method, functions)
     march = March(
         machine, control, checked(start, "y0"), tolerances, watched, tuple(args),
-        asked(at, span), dense or at is None, first_step or 0.0,
+        asked(at, span), dense or at is None, first_step or 0.0, inner,
     )  # fmt: skip
     march.run()
     t, y = march.mesh() if at is None else march.answered()
@@ -102,7 +104,7 @@ def solve(
 
 
 @lru_cache(maxsize=128)
-def _machine(
+def _explicit(
     f: Function, shape: tuple[int, ...], method: str, events: tuple[Function, ...]
 ) -> Machine:
     table = find(method)
@@ -110,23 +112,36 @@ def _machine(
     watch = right_hand_side.watcher(events, shape, wrap)
     if isinstance(table, Explicit):
         slope = right_hand_side.slope(f, shape)
-        pieces = explicit.pieces(table, slope, wrap)
-        return Machine.build(pieces, explicit.space(table), watch, wrap)
+        size = math.prod(shape) if wrap is right_hand_side.COMPILED else None
+        pieces = explicit.pieces(table, slope, wrap, size)
+        return Machine.build(pieces, explicit.room(table), watch, wrap)
     raise ValueError(f"\"{method}\" is for x'' = a(t, x): use solve_newton")
 
 
-def _flat(f: Function, shape: tuple[int, ...], args: tuple[Any, ...]) -> Function:
-    """f of a flat state, for linear algebra."""
+@lru_cache(maxsize=128)
+def _implicit(
+    f: Function, shape: tuple[int, ...], method: str, events: tuple[Function, ...], key: NewtonKey
+) -> Machine:
+    table = find(method)
+    assert isinstance(table, Implicit | Rosenbrock | BackwardDifference)
+    size, newton = math.prod(shape), key.newton(math.prod(shape))
+    given = () if newton.jacobian is None else (newton.jacobian,)
+    wrap = right_hand_side.wrap((f, *events, *given))
+    watch = right_hand_side.watcher(events, shape, wrap)
+    slope = right_hand_side.slope(f, shape)
+    return Machine.build(*implicit.pieces(table, slope, newton, size, wrap), watch, wrap)
 
-    def flat(t: float, y: Array) -> Array:
-        return np.asarray(f(t, y.reshape(shape), *args), float).reshape(-1)
 
-    return flat
+def _tolerances(atol: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """An absolute tolerance for each component, in one row."""
+    result = np.empty(shape)
+    result[...] = atol
+    return result.reshape(-1)
 
 
-def _unit(start: Array) -> Array:
-    """Scales for Newton's method where no tolerance is given: the size of the initial state."""
-    return np.full(start.size, max(float(np.abs(start).max(initial=0.0)), 1e-300))
+def _size(start: Array) -> float:
+    """Scale for Newton's method where no tolerance is given: the size of the initial state."""
+    return max(float(np.abs(start).max(initial=0.0)), 1e-300)
 
 
 def _adaptive(
@@ -134,15 +149,23 @@ def _adaptive(
     table: Table,
     span: tuple[float, float],
     rtol: float,
-    atol: Array,
+    atol: ArrayLike,
     largest: float,
     limit: int,
 ) -> Control:
-    if getattr(table, "b_low", None) is None:
+    past = isinstance(table, BackwardDifference)
+    if getattr(table, "b_low", None) is None and not past:
         raise ValueError(f'"{method}" has no error estimate: give it a step')
-    if not (0 <= rtol < 1 and (atol >= 0).all() and (rtol > 0 or (atol > 0).all())):
+    least = atol if isinstance(atol, float | int) else float(np.min(atol, initial=math.inf))
+    if not (0 <= rtol < 1 and least >= 0 and (rtol > 0 or least > 0)):
         raise ValueError("rtol must lie in 0 ... 1 and atol be at least 0, one of them above 0")
-    order = table.order if isinstance(table, Explicit) else table.low_order + 1  # type: ignore[union-attr]
-    # Below some roundings of y, no step could ever be accepted.
+    order = table.order
+    if isinstance(table, Implicit | Rosenbrock):
+        order = min(order, table.low_order)
+    if not isinstance(table, Explicit):
+        order += 1
+    # Below some roundings of y, no step could ever be accepted. A formula with a past is stable
+    # only while steps grow slowly: the second one, up to 1 + sqrt(2).
     t0, t1 = ends(span)
-    return Control(False, t0, t1, 0.0, 0, max(rtol, 1e-15), float(order), largest, limit)
+    rtol, most = max(rtol, 1e-15), 2.0 if past else 10.0
+    return Control(False, t0, t1, 0.0, 0, rtol, float(order), largest, limit, most)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from motes.integrate import table as find
 from motes.ode import newton, right_hand_side
+from motes.ode.march import Room
 from motes.ode.run import Machine, March, as_events, asked, checked, fixed
 from motes.ode.solution import Event, NewtonSolution
 from motes.ode.solve import MOST_STEPS, solve
@@ -140,9 +141,9 @@ def _machine(
     watch = right_hand_side.watcher(events, (2, *shape), wrap)
     a = right_hand_side.acceleration(acceleration, shape, int(drag))
     if isinstance(table, Nystrom):
-        pieces, slopes = newton.nystrom(table, a, wrap), table.stages
+        pieces, room = newton.nystrom(table, a, wrap), Room(table.stages, 0)
     else:
         assert isinstance(table, Splitting)
         pieces = newton.splitting(table, a, wrap, conservative=conservative, drag=drag)
-        slopes = newton.SLOPES
-    return Machine.build(pieces, (slopes, slopes), watch, wrap)
+        room = newton.SPLITTING
+    return Machine.build(pieces, room, watch, wrap)

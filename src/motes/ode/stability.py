@@ -64,7 +64,7 @@ def growth(table: Table) -> Growth:
     of an eigenvalue of one step.
     """
     if isinstance(table, Explicit | Implicit):
-        a = np.zeros((table.stages, table.stages))
+        a = np.zeros((len(table.b), len(table.b)))
         for i, row in enumerate(table.a):
             a[i, : len(row)] = row
         return _rational(a, np.array(table.b))

@@ -1,17 +1,19 @@
 """The document: read, checked, addressed, written."""
 
-from motes.scene.document import Scene, System, from_document
+from motes.scene.document import Scene, System, drawable, from_document
 from motes.scene.gallery import gallery, gallery_text
 from motes.scene.read import load, loads
 from motes.scene.schema import schema
-from motes.scene.sections import Camera, Film, Sky
+from motes.scene.sections import Camera, Film, Periodic, Sky
 
 __all__ = [
     "Camera",
     "Film",
+    "Periodic",
     "Scene",
     "Sky",
     "System",
+    "drawable",
     "from_document",
     "gallery",
     "gallery_text",

@@ -10,11 +10,11 @@ from motes.catalog import KINDS, Component, catalog, kinds
 from motes.catalog.parameter import SCOPES, Parameter
 from motes.control.curve import SCOPE_OF
 from motes.control.parse import EXTRAPOLATIONS, INTERPOLATIONS
-from motes.control.tables import MOST
+from motes.control.tables import MOST, SPECIES
 from motes.scene.document import Scene, System
 from motes.scene.names import WORD
 from motes.scene.section import Section
-from motes.scene.sections import Camera, Film, Sky
+from motes.scene.sections import Camera, Film, Periodic, Sky
 
 Schema = dict[str, Any]
 
@@ -35,6 +35,14 @@ _PLAIN: dict[str, Schema] = {
 _NAME: Schema = {"type": "string", "pattern": rf"^{WORD.pattern}$"}
 
 
+_SECTIONS: dict[str, type[Section]] = {
+    "film": Film,
+    "camera": Camera,
+    "sky": Sky,
+    "periodic": Periodic,
+}
+
+
 def schema() -> Schema:
     """JSON Schema (draft 2020-12) of a scene file, for editors that complete and check.
 
@@ -46,14 +54,14 @@ def schema() -> Schema:
         definitions |= _forms(shape)
     for kind in KINDS:
         definitions |= _kind(kind)
-    for name, model in (("film", Film), ("camera", Camera), ("sky", Sky)):
+    for name, model in _SECTIONS.items():
         definitions[name] = _section(model)
     definitions["system"] = _section(
         System,
         {"name": _NAME, "look": {"$ref": "#/$defs/look"}, **_lists(System.lists)},
         required=("name",),
     )
-    tables = {name: {"$ref": f"#/$defs/{name}"} for name in ("film", "camera", "sky")}
+    tables = {name: {"$ref": f"#/$defs/{name}"} for name in _SECTIONS}
     whole = _section(Scene, tables | _lists((*Scene.lists, "system")))
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -195,6 +203,10 @@ _TABLES: dict[str, Schema] = {
             {key: {"type": "number", "minimum": 0, "maximum": most} for key, most in MOST.items()},
             ("count",),
         ),
+    },
+    "species": {
+        "type": "object",
+        "additionalProperties": _table({key: {"type": "number"} for key in SPECIES}, ()),
     },
     "names": {
         "type": "array",

@@ -1,8 +1,8 @@
-"""The tables of a scene that a film needs: camera, film and sky."""
+"""The tables of a scene: camera, film, sky, and the box that repeats."""
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import field_validator
 
@@ -90,3 +90,19 @@ class Sky(Section):
 
     stars: Control = quantity(0, "", at_least=0, at_most=100_000, scope="scene")
     """How many stars there are in the whole sky."""
+
+
+class Periodic(Section):
+    """A box that repeats: who leaves it on one side comes in on the other.
+
+    Particles feel the nearest images of others. Laws between particles must not reach further than
+    half of a period.
+    """
+
+    noun: ClassVar[str] = "periodic"
+
+    low: Any = quantity((0.0, 0.0, 0.0), "m", scope="fixed")
+    """The corner with the smallest coordinates."""
+
+    size: Any = quantity((0.0, 0.0, 0.0), "m", at_least=0, scope="fixed")
+    """Lengths after which space repeats along x, y and z; 0 where it does not."""

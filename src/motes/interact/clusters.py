@@ -1,0 +1,235 @@
+"""Lists of neighbours of clusters: every slot within a radius of any of a cluster's particles.
+
+The particles of a cluster share a list, so that its neighbours are gathered once into consecutive
+memory and every particle's sum over them is a loop of vector instructions.
+"""
+
+# mypy: disallow-untyped-decorators=False
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.interact.arrange import Arranged
+from motes.interact.cells import Grid
+from motes.jit import STRICT, jit, share
+from motes.memory import allocate
+
+WIDTH = 16
+"""Lists are filled up to a multiple of this: loops over them have no rest."""
+
+
+class Part(NamedTuple):
+    """The lists of consecutive clusters."""
+
+    cluster: NDArray[np.int32]
+    """(k + 1,) slots at which the clusters begin and, last, end."""
+    first: NDArray[np.int64]
+    """(k + 1,) where their lists begin in `entry` and, last, end."""
+    entry: NDArray[np.int32]
+    """Slots of neighbours; the slot after the last stands for nobody."""
+    longest: int
+    """Length of the longest list."""
+
+
+class _Room(NamedTuple):
+    """Candidates of one cluster."""
+
+    position: NDArray[Any]
+    slot: NDArray[np.int32]
+    hit: NDArray[np.int32]
+
+
+def _room(points: int, real: Any) -> _Room:
+    return _Room(
+        np.empty((3, points), real), np.empty(points, np.int32), np.empty(points, np.int32)
+    )
+
+
+@jit(inline=True, flags=STRICT)
+def _span(low: Any, high: Any, origin: Any, scale: Any, count: Any, wraps: Any) -> Any:
+    """First cell and number of cells from a coordinate to another; they may go round the end."""
+    first, last = np.floor((low - origin) * scale), np.floor((high - origin) * scale)
+    if wraps:
+        number = min(last - first + 1, np.float64(count))
+        return np.int64(first - count * np.floor(first / count)), np.int64(number)
+    first, last = max(first, np.float64(0)), min(last, np.float64(count - 1))
+    return np.int64(first), np.int64(max(last - first + 1, np.float64(0)))
+
+
+@jit(inline=True, flags=STRICT)
+def _between(low: Any, high: Any, left: Any, wide: Any, wraps: Any, slack: Any) -> Any:
+    """Square of the distance along an axis between a box and a cell, at most."""
+    if wraps:
+        return np.float64(0)
+    apart = max(left - high, low - (left + wide)) - slack
+    return max(apart, np.float64(0)) ** 2
+
+
+@jit(inline=True)
+def _from(number: Any, table: Any, keys: Any, shift: Any) -> Any:
+    """The first point whose cell's number is not below a number."""
+    entry = np.uint64(number) >> shift
+    if entry >= np.uint64(table.size - 1):
+        return np.int64(keys.size)
+    low = np.int64(table[entry])
+    if shift > np.uint64(0):
+        high = np.int64(table[entry + np.uint64(1)])
+        while low < high:
+            middle = (low + high) >> 1
+            if keys[np.uint64(middle)] < np.uint64(number):
+                low = middle + 1
+            else:
+                high = middle
+    return low
+
+
+@jit(flags=STRICT)
+def _collect(
+    low: Any, high: Any, wide: Any, grid: Any, xs: Any, ys: Any, zs: Any, keys: Any, table: Any,
+    shift: Any, begin: Any, points: Any, rx: Any, ry: Any, rz: Any, slot: Any,
+) -> Any:  # fmt: skip
+    """Append the points of all cells within `wide` of a box to the room, as far as it goes."""
+    if keys.size == 0:
+        return points
+    nx, ny, nz = grid.shape[0], grid.shape[1], grid.shape[2]
+    x0, y0, z0 = grid.low[0], grid.low[1], grid.low[2]
+    sx, sy, sz = grid.scale[0], grid.scale[1], grid.scale[2]
+    wraps_x, wraps_y, wraps_z = grid.wraps[0], grid.wraps[1], grid.wraps[2]
+    slack, cy, cz = 1e-6 * wide, 1 / sy, 1 / sz
+    y, ny_around = _span(low[1] - wide, high[1] + wide, y0, sy, ny, wraps_y)
+    z, nz_around = _span(low[2] - wide, high[2] + wide, z0, sz, nz, wraps_z)
+    for k in range(z, z + nz_around):
+        dz2 = _between(low[2], high[2], z0 + k * cz, cz, wraps_z, slack)
+        layer = (k - nz if k >= nz else k) * ny
+        for j in range(y, y + ny_around):
+            left2 = wide * wide - dz2 - _between(low[1], high[1], y0 + j * cy, cy, wraps_y, slack)
+            if left2 < 0:
+                continue
+            half = np.sqrt(left2) + slack
+            x, nx_around = _span(low[0] - half, high[0] + half, x0, sx, nx, wraps_x)
+            row = (layer + (j - ny if j >= ny else j)) * nx
+            start, left = x, nx_around
+            while left > 0:
+                length = min(left, nx - start)
+                first = _from(row + start, table, keys, shift)
+                last = _from(row + start + length, table, keys, shift)
+                if points + last - first <= slot.size:
+                    p = np.uint64(points)
+                    for q in range(np.uint64(first), np.uint64(last)):
+                        rx[p], ry[p], rz[p] = xs[q], ys[q], zs[q]
+                        slot[p] = np.int32(begin) + np.int32(q)
+                        p += np.uint64(1)
+                points += last - first
+                start, left = np.int64(0), left - length
+    return points
+
+
+@jit(flags=STRICT)
+def _seek(
+    position: Any,
+    cluster: Any,
+    cells: Any,
+    ghosts: Any,
+    grid: Any,
+    inner: Any,
+    radius: Any,
+    begin: Any,
+    room: Any,
+    first: Any,
+    entry: Any,
+) -> Any:
+    """Append lists of clusters from `begin` on; returns the first without, and room it needs."""
+    real = position.dtype.type
+    limit = real(radius) * real(radius)
+    wide = radius * (1 + 2.0**-18)
+    n = cells.key.size
+    nobody = np.int32(n + ghosts.key.size)
+    xs, ys, zs = position[0], position[1], position[2]
+    cx, cy, cz = cells.position[0], cells.position[1], cells.position[2]
+    gx, gy, gz = ghosts.position[0], ghosts.position[1], ghosts.position[2]
+    cell_key, cell_table, cell_shift = cells.key, cells.first, cells.shift
+    ghost_key, ghost_table, ghost_shift = ghosts.key, ghosts.first, ghosts.shift
+    rx, ry, rz = room.position[0], room.position[1], room.position[2]
+    slot, hits = room.slot, room.hit
+    for c in range(begin, cluster.size - 1):
+        a, b = cluster[c], cluster[c + 1]
+        low = (np.float64(xs[a]), np.float64(ys[a]), np.float64(zs[a]))
+        high = low
+        for i in range(a + 1, b):
+            x, y, z = np.float64(xs[i]), np.float64(ys[i]), np.float64(zs[i])
+            low = (min(low[0], x), min(low[1], y), min(low[2], z))
+            high = (max(high[0], x), max(high[1], y), max(high[2], z))
+        points = _collect(
+            low, high, wide, grid, cx, cy, cz, cell_key, cell_table, cell_shift, np.int64(0),
+            np.int64(0), rx, ry, rz, slot,
+        )  # fmt: skip
+        alone = True
+        for axis in range(3):
+            alone &= (low[axis] - wide > inner[0, axis]) & (high[axis] + wide < inner[1, axis])
+        if not alone:
+            points = _collect(
+                low, high, wide, grid, gx, gy, gz, ghost_key, ghost_table, ghost_shift, n,
+                points, rx, ry, rz, slot,
+            )  # fmt: skip
+        total = first[c]
+        if points > slot.size or total + points + WIDTH > entry.size:
+            return c, points
+        hit = hits[:points]
+        hit[:] = np.int32(0)
+        for i in range(a, b):
+            x, y, z = xs[i], ys[i], zs[i]
+            for q in range(hit.size):
+                dx, dy, dz = x - rx[q], y - ry[q], z - rz[q]
+                hit[q] |= np.int32(dx * dx + dy * dy + dz * dz <= limit)
+        new = np.uint64(total)
+        for q in range(hit.size):
+            entry[new] = slot[q]
+            new += np.uint64(hit[q])
+        while (new - np.uint64(total)) % np.uint64(WIDTH):
+            entry[new] = nobody
+            new += np.uint64(1)
+        first[c + 1] = np.int64(new)
+    return cluster.size - 1, np.int64(0)
+
+
+def lists(
+    targets: Arranged,
+    sources: Arranged,
+    cut: Grid,
+    radius: float,
+    old: list[Part] | None = None,
+) -> list[Part]:
+    """Every cluster's neighbours among the sources within `radius` [m], itself among them.
+
+    Lists go into the memory of `old` ones where that is large enough.
+    """
+    position = targets.real.position
+    real = position.dtype.type
+    parts: list[Any] = [None] * len(targets.clusters)
+
+    def seek(k: int) -> None:
+        cluster = targets.clusters[k]
+        first = np.zeros(cluster.size, np.int64)
+        given = old[k].entry if old and k < len(old) else None
+        entry = np.empty(32 * (cluster[-1] - cluster[0] + 1), np.int32) if given is None else given
+        room, begin = _room(1024, real), 0
+        while begin < cluster.size - 1:
+            begin, points = _seek(
+                position, cluster, sources.real, sources.ghosts, cut, sources.inner, float(radius),
+                begin, room, first, entry,
+            )  # fmt: skip
+            if points > room.slot.size:
+                room = _room(2 * points, real)
+            if first[begin] + points + WIDTH > entry.size:
+                share_done = (begin + 1) / (cluster.size - 1)
+                size = int(1.2 * (first[begin] + points + WIDTH) / min(share_done, 1.0))
+                larger = allocate((size,), np.int32, "a list of neighbours")
+                larger[: first[begin]] = entry[: first[begin]]
+                entry = larger
+        parts[k] = Part(cluster, first, entry, int(np.diff(first).max(initial=1)))
+
+    share(seek, len(parts))
+    return parts

@@ -1,0 +1,432 @@
+"""The laws of limited reach of one group: neighbour lists that last, and sums over them.
+
+Laws whose reaches are alike share lists. A list holds what is within the longest reach and a
+margin, its skin; it is good until a particle has gone so far that the longest reach and both
+particles' ways do not fit into it any more (Verlet, Physical Review 159 (1967) 98).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.compile.pairs import FORCE, LISTED, POTENTIAL, VIRIAL, Law
+from motes.control.curve import Curve
+from motes.errors import SceneError, SimulationError
+from motes.interact.arrange import Arranged, Box, Packing, arrange, common_grid, wrapped
+from motes.interact.clusters import Part, lists
+from motes.jit import blocks, share
+from motes.state import Particles
+from motes.step import Stepper
+from motes.swarm import Swarm
+
+ALIKE = 1.5
+"""Ratio of reaches up to which laws share lists."""
+
+CAUTION = 1 - 2.0**-10
+"""Share of the allowed way after which a list is stale: more than rounding takes away."""
+
+ROWS = 1 << 14
+"""Rows of one task of a loop that is quick."""
+
+
+@dataclass
+class Body:
+    """One system of a group at one stage: `position`, `velocity` (3, n) [m, m/s], its traits."""
+
+    stepper: Stepper
+    rows: Particles
+    alive: int
+    position: NDArray[Any]
+    velocity: NDArray[Any]
+    time: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Name of the system."""
+        return self.rows.name
+
+    @property
+    def mass(self) -> NDArray[Any]:
+        """Masses (n,) [kg]."""
+        return self.stepper.mass(self.rows, self.alive)
+
+    def lasts(self, name: str) -> bool:
+        """Whether a number of every particle never changes."""
+        traits = self.stepper.system.motion.traits
+        return name in traits and not isinstance(traits[name][1], Curve)
+
+    def column(self, name: str) -> NDArray[Any]:
+        """A number of every particle: v and an axis, or a trait."""
+        if name in ("vx", "vy", "vz"):
+            axis: NDArray[Any] = self.velocity["xyz".index(name[1])]
+            return axis
+        return self.stepper.trait(name, self.rows, self.alive, self.time)
+
+
+@dataclass(frozen=True)
+class Lists:
+    """The neighbour lists of laws that share them."""
+
+    radius: float
+    """What is within it is listed [m]."""
+    arranged: dict[str, Arranged]
+    near: dict[tuple[str, str], list[Part]]
+    """Lists by target and source."""
+    kept: dict[str, tuple[int, int]]
+    """Rows and deaths for which they hold."""
+    step: int = 0
+    """Number of the step in which they were built."""
+    columns: dict[tuple[str, str], NDArray[Any]] = field(default_factory=dict)
+    """What does not change while they hold, by system and name, in the order of slots."""
+    settled: bool = False
+    """Whether rows are in the order of cells."""
+
+
+@dataclass
+class Lasting:
+    """What a group keeps from step to step: lists, and what was last summed up."""
+
+    lists: list[Lists | None] = field(default_factory=list)
+    push: dict[str, NDArray[Any]] | None = None
+    """Accelerations (3, n) of all systems at `time`, while nothing has moved since."""
+    time: float = 0.0
+    kept: dict[str, tuple[int, int]] = field(default_factory=dict)
+    builds: int = 0
+    """How often lists were built."""
+    untidy: set[str] = field(default_factory=set)
+    """Systems whose rows are scattered, to be moved before the next step."""
+    steps: int = 0
+    """How many steps were begun."""
+
+    def copy(self) -> Lasting:
+        """A copy that shares arrays, which are replaced and never written to."""
+        return replace(self, lists=list(self.lists), untidy=set(self.untidy))
+
+    def arrays(self) -> Iterator[NDArray[Any]]:
+        """Everything that can change the next bit."""
+        for part in self.lists:
+            for arranged in part.arranged.values() if part else ():
+                yield from (arranged.order, arranged.real.position)
+        yield from (self.push or {}).values()
+
+
+@dataclass
+class Class:
+    """Laws that share lists, with the systems that each acts on and feels."""
+
+    laws: list[tuple[Law, tuple[str, ...], tuple[str, ...]]]
+
+    @property
+    def pairs(self) -> list[tuple[str, str]]:
+        """Targets and sources for which lists are needed."""
+        found = {(a, b) for _, targets, sources in self.laws for a in targets for b in sources}
+        return sorted(found)
+
+    @property
+    def systems(self) -> list[str]:
+        """Systems that take part."""
+        return sorted({name for pair in self.pairs for name in pair})
+
+    def reach(self, time: float) -> float:
+        """The longest reach at a time [m]."""
+        return max(law.reach(time) for law, _, _ in self.laws)
+
+    def radius(self, time: float, periodic: Box) -> float:
+        """Radius of lists that are built at a time [m]."""
+        wanted = max(
+            law.reach(time) * (1 + float(law.values(time)["skin"])) for law, _, _ in self.laws
+        )
+        return min(wanted, 0.999 * periodic.shortest)
+
+    def stale(self, found: Lists, moved: float, time: float, step: int) -> bool:
+        """Whether lists may miss a pair after particles have moved [m], or were to last shorter."""
+        if every := min(law.rebuild for law, _, _ in self.laws):
+            return step - found.step >= every or not np.isfinite(moved)
+        return not 2 * moved <= (found.radius - self.reach(time)) * CAUTION
+
+
+class Nearby:
+    """Evaluates a group's laws of limited reach."""
+
+    def __init__(
+        self,
+        laws: Sequence[tuple[Law, tuple[str, ...], tuple[str, ...]]],
+        real: type,
+        periodic: Box,
+    ) -> None:
+        self.real, self.periodic = real, periodic
+        self.laws = list(laws)
+        self.classes: list[Class] = []
+        gathering = [one for one in laws if not one[0].pairwise and not one[0].nearest]
+        self.swarm = Swarm(gathering, real, periodic) if gathering else None
+        if self.swarm is not None and not self.swarm.fits(0.0):
+            self.swarm = None
+        listed = [one for one in laws if self.swarm is None or one not in gathering]
+        for one in sorted(listed, key=lambda one: -one[0].reach(0.0)):
+            first = self.classes[-1].laws[0][0] if self.classes else None
+            alike = first is not None and first.rebuild == one[0].rebuild
+            if first is None or not alike or first.reach(0.0) > ALIKE * one[0].reach(0.0):
+                self.classes.append(Class([]))
+            self.classes[-1].laws.append(one)
+        self._room: dict[Any, NDArray[Any]] = {}
+        for law, _, _ in self.laws:
+            if message := self._too_long(law, 0.0):
+                raise SceneError(message)
+
+    def _too_long(self, law: Law, time: float) -> str:
+        reach, half = law.reach(time), self.periodic.shortest / 2
+        if 0 < reach <= half:
+            return ""
+        if reach > half:
+            return (
+                f"{law.owner}: its reach {reach:g} m is more than half of the shortest period, "
+                f"{half:g} m. Shorten the reach or widen [periodic]."
+            )
+        return f"{law.owner}: its reach {reach:g} m must be above 0 m."
+
+    @property
+    def depends_on_velocity(self) -> bool:
+        """Whether any law reads velocities."""
+        return any(law.depends_on_velocity for law, _, _ in self.laws)
+
+    def radius(self, time: float) -> float:
+        """The widest radius of lists at a time [m]."""
+        return max((part.radius(time, self.periodic) for part in self.classes), default=0.0)
+
+    # ------------------------------------------------------------------ lists
+
+    def settle(self, bodies: dict[str, Body], memory: Lasting) -> None:
+        """Bring rows into the order of cells, before the stages of a step.
+
+        Lists that do not hold any more, since particles were born or have died, are built anew.
+        """
+        for name in sorted(memory.untidy):
+            self._tidy(name, bodies[name], memory)
+        memory.untidy = set()
+        memory.lists = memory.lists or [None] * len(self.classes)
+        memory.steps += 1
+        for k, shared in enumerate(self.classes):
+            if not _holds(memory.lists[k], shared.systems, bodies):
+                self._build(k, bodies, memory, memory.steps - 1)
+        moved: set[str] = set()
+        for k, found in enumerate(memory.lists):
+            if found is not None and not found.settled:
+                self._reorder(k, set(found.arranged) - moved, bodies, memory)
+                moved |= set(found.arranged)
+
+    def _tidy(self, name: str, body: Body, memory: Lasting) -> None:
+        """Move a swarm's rows into the order of its cells, unless lists order them."""
+        if self.swarm is None or any(name in shared.systems for shared in self.classes):
+            return
+        order = self.swarm.order(body)
+        body.rows.reorder(order)
+        if memory.push is not None:
+            memory.push = {**memory.push, name: memory.push[name][:, order]}
+
+    def _reorder(self, k: int, names: set[str], bodies: dict[str, Body], memory: Lasting) -> None:
+        """Move rows into the order of one class's cells; all lists keep telling where they are."""
+        mine = memory.lists[k]
+        assert mine is not None
+        for name in sorted(names):
+            order = mine.arranged[name].order
+            bodies[name].rows.reorder(order)
+            place = np.empty_like(order)
+            place[order] = np.arange(place.size, dtype=np.int32)
+            for i, other in enumerate(memory.lists):
+                if other is not None and name in other.arranged:
+                    there = other.arranged[name]
+                    there = there._replace(order=place[there.order])
+                    memory.lists[i] = replace(other, arranged={**other.arranged, name: there})
+            if memory.push is not None:
+                memory.push = {**memory.push, name: memory.push[name][:, order]}
+        settled = memory.lists[k]
+        assert settled is not None
+        memory.lists[k] = replace(settled, settled=True)
+
+    def _build(self, k: int, bodies: dict[str, Body], memory: Lasting, step: int) -> None:
+        memory.lists[k] = replace(self.build(self.classes[k], bodies), step=step)
+        memory.builds += 1
+
+    def build(self, shared: Class, bodies: dict[str, Body]) -> Lists:
+        """Lists for the laws of a class, of bodies as they are."""
+        time = next(iter(bodies.values())).time
+        radius = shared.radius(time, self.periodic)
+        positions = {}
+        for name in shared.systems:
+            given: NDArray[Any] = bodies[name].position[:, : bodies[name].alive]
+            position: NDArray[Any] = given.astype(self.real)
+            if not np.isfinite(position).all():
+                position = np.where(np.isfinite(position), position, 0.0).astype(position.dtype)
+            wrapped(position, self.periodic)
+            positions[name] = position
+        cut = common_grid(list(positions.values()), radius, self.periodic)
+        arranged = {n: arrange(p, cut, radius, self.periodic) for n, p in positions.items()}
+        near = {(a, b): lists(arranged[a], arranged[b], cut, radius) for a, b in shared.pairs}
+        kept = {name: _kept(bodies[name]) for name in shared.systems}
+        return Lists(radius, arranged, near, kept)
+
+    # ------------------------------------------------------------------ sums
+
+    def push(
+        self, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting
+    ) -> None:
+        """Add the laws' accelerations (3, n) [m/s2] to pushes."""
+        if self.swarm is not None:
+            self.swarm.push(bodies, pushes, memory.untidy)
+        memory.lists = memory.lists or [None] * len(self.classes)
+        for k, shared in enumerate(self.classes):
+            time = next(iter(bodies.values())).time
+            for law, _, _ in shared.laws:
+                if message := self._too_long(law, time):
+                    raise SimulationError(message)
+            found = memory.lists[k]
+            moved = np.inf
+            if found is not None and _holds(found, shared.systems, bodies):
+                packed, moved = self._packed(shared, found, bodies)
+            if found is None or shared.stale(found, moved, time, memory.steps):
+                self._build(k, bodies, memory, memory.steps)
+                found = memory.lists[k]
+                assert found is not None
+                packed, _ = self._packed(shared, found, bodies)
+            for law, targets, sources in shared.laws:
+                self._push(law, targets, sources, time, found, packed, pushes)
+
+    def _packed(
+        self, shared: Class, found: Lists, bodies: dict[str, Body]
+    ) -> tuple[dict[str, dict[str, NDArray[Any]]], float]:
+        """What the laws read of every system in the order of slots; how far one has moved [m]."""
+        wanted: dict[str, set[str]] = {name: set() for name in shared.systems}
+        for law, targets, sources in shared.laws:
+            own, other = law.fields
+            for name in targets:
+                wanted[name] |= set(own)
+            for name in sources:
+                wanted[name] |= set(other)
+        packed, moved = {}, 0.0
+        for name, body in bodies.items():
+            if name not in wanted:
+                continue
+            packing = Packing(found.arranged[name], self.periodic)
+            size = found.arranged[name].slots + 1
+            position = self._space((name, "x"), (3, size))
+            moved = max(moved, packing.positions(body.position, position))
+            columns = dict(zip("xyz", position, strict=True))
+            for axis, then in enumerate(LISTED):
+                if then in wanted[name]:
+                    parts = found.arranged[name].real, found.arranged[name].ghosts
+                    columns[then] = np.concatenate([*(p.position[axis] for p in parts), [0]])
+            for field_ in sorted(wanted[name] - set(columns)):
+                kept = found.columns.get((name, field_))
+                if kept is None:
+                    lasts = body.lasts(field_)
+                    room = (
+                        np.empty(size, self.real) if lasts else self._space((name, field_), (size,))
+                    )
+                    packing.values(body.column(field_), room)
+                    kept = room
+                    if lasts:
+                        found.columns[name, field_] = room
+                columns[field_] = kept
+            packed[name] = columns
+        return packed, float(np.sqrt(moved))
+
+    def _space(self, key: Any, shape: tuple[int, ...]) -> NDArray[Any]:
+        """Room that lasts for one evaluation."""
+        size = int(np.prod(shape))
+        room = self._room.get(key)
+        if room is None or room.size < size:
+            room = self._room[key] = np.empty(size + size // 8, self.real)
+        return room[:size].reshape(shape)
+
+    def _summed(
+        self, law: Law, what: str, target: str, sources: Iterable[str], time: float,
+        found: Lists, packed: dict[str, dict[str, NDArray[Any]]],
+    ) -> NDArray[Any]:  # fmt: skip
+        """Sums (numbers, n) over the neighbours of every particle of a target."""
+        n = found.arranged[target].order.size
+        out = self._space(("sums",), (law.sums(what), n))
+        out[:] = 0
+        own, other = law.fields
+        mine = tuple(packed[target][name] for name in own)
+        limit, listed = self.real(law.reach(time)) ** 2, self.real(found.radius) ** 2
+        kernel = law.sweep(what)
+        for source in sources:
+            numbers = law.numbers(time, self.real, (target, source))
+            theirs = tuple(packed[source][name] for name in other)
+            parts = found.near[target, source]
+
+            def sweep(
+                k: int,
+                numbers: Any = numbers,
+                theirs: Any = theirs,
+                parts: Any = parts,
+                source: str = source,
+            ) -> None:
+                part = parts[k]
+                room: NDArray[Any] = np.empty((len(other), part.longest), self.real)
+                best: NDArray[Any] = np.empty(max(law.nearest, 1), self.real)
+                pick = np.empty(max(law.nearest, 1), np.int64)
+                kernel(
+                    numbers, mine, theirs, *part[:3], source == target, limit, listed, room, best,
+                    pick, out,
+                )  # fmt: skip
+
+            share(sweep, len(parts))
+        return out
+
+    def _push(
+        self, law: Law, targets: Iterable[str], sources: Iterable[str], time: float,
+        found: Lists, packed: dict[str, dict[str, NDArray[Any]]],
+        pushes: dict[str, NDArray[Any]],
+    ) -> None:  # fmt: skip
+        numbers = law.numbers(time, self.real)
+        for target in targets:
+            sums = self._summed(law, law.summed, target, sources, time, found, packed)
+            mine = tuple(packed[target][name] for name in law.fields[0])
+            order, push = found.arranged[target].order, pushes[target]
+            parts = blocks(order.size, ROWS)
+            share(lambda k: law.finish(numbers, mine, sums, order, push, *parts[k]), len(parts))  # noqa: B023
+
+    # ------------------------------------------------------------------ measures
+
+    def energy(self, bodies: dict[str, Body]) -> float:
+        """Potential energy [J] of the pair laws that have one: of two sources once."""
+        return float(self._total(bodies, POTENTIAL)[0])
+
+    def virial(self, bodies: dict[str, Body]) -> NDArray[np.float64]:
+        """Sums of x f_x, y f_y, z f_z, x f_y, x f_z, y f_z over the pairs of pair laws (6,) [J]."""
+        return np.asarray(self._total(bodies, VIRIAL))
+
+    def _total(self, bodies: dict[str, Body], what: str) -> NDArray[np.float64]:
+        total = np.zeros(1 if what == POTENTIAL else 6)
+        for shared in self.classes:
+            chosen = [
+                one for one in shared.laws
+                if type(one[0].part).kernel(FORCE if what == VIRIAL else what) is not None
+            ]  # fmt: skip
+            if not chosen or not any(bodies[name].alive for name in shared.systems):
+                continue
+            part = Class(chosen)
+            found = self.build(part, bodies)
+            packed, _ = self._packed(part, found, bodies)
+            time = next(iter(bodies.values())).time
+            for law, targets, sources in chosen:
+                for target in targets:
+                    sums = self._summed(law, what, target, sources, time, found, packed)
+                    share_ = 0.5 if target in sources else 1.0
+                    total += share_ * sums.sum(axis=1, dtype=np.float64)
+        return total
+
+
+def _kept(body: Body) -> tuple[int, int]:
+    return body.alive, body.rows.deaths
+
+
+def _holds(found: Lists | None, systems: Iterable[str], bodies: dict[str, Body]) -> bool:
+    """Whether lists are of the particles that there are."""
+    return found is not None and all(found.kept[n] == _kept(bodies[n]) for n in systems)
