@@ -176,8 +176,12 @@ def _kept(
 ) -> Iterator[Frame]:
     """Frames of a simulation, each on its way to the store before anybody draws it."""
     frames = simulation.frames(first=numbers[0], last=numbers[-1])
+    interacts = bool(store.manifest.scene.get("interact"))
     for frame in report.simulated(frames, simulation):
         follower.add(store.write, frame)
+        if interacts:
+            # Of the last whole step before the frame, whose time they state.
+            store.note(frame.index, simulation.measure())
         yield frame
 
 

@@ -86,18 +86,13 @@ def translations(order: int, harmonic: bool) -> Translations:
         old = {b: m * power[sum(b)] for b, m in zip(basis, given, strict=True)}
         shift = monomials(order, (place[0], place[1], place[2]), ones(place[0]))
         new = products(
-            [
-                [(old[c], shift[minus(b, c)]) for c in basis if min(minus(b, c)) >= 0]
-                for b in every
-            ]
+            [[(old[c], shift[minus(b, c)]) for c in basis if min(minus(b, c)) >= 0] for b in every]
         )
         for row, moment in enumerate(folded(kind, dict(zip(every, new, strict=True)))):
             moments[row] = total(moment)
 
     @traced
-    def moments_to_local(
-        place: Any, chosen: Any, table: Any, h: Any, e2: Any, local: Any
-    ) -> None:
+    def moments_to_local(place: Any, chosen: Any, table: Any, h: Any, e2: Any, local: Any) -> None:
         x, y, z = place[0], place[1], place[2]
         inverse = inverse_root(x * x + y * y + z * z + e2)
         slopes = derivatives(order, harmonic, (x * inverse, y * inverse, z * inverse), ones(x))

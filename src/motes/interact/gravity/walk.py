@@ -13,8 +13,6 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import numpy as np
-
 from motes.interact.gravity.desk import Desk, Limits
 from motes.interact.gravity.lanes import LANES
 from motes.interact.gravity.near import near_field
@@ -50,9 +48,7 @@ def _accepts(limits: Limits, allowed: Any, r2: Any, radii: Any, mass: Any, order
 
 
 @cache
-def walker(
-    law: str, real: type, potential: bool, order: int
-) -> Callable[..., Any]:
+def walker(law: str, real: type, potential: bool, order: int) -> Callable[..., Any]:
     """Compiled walk for a pair law, numbers of type `real`, with or without the potential.
 
     (targets, sources, same, begin, end, limits, desk, out) -> int: writes to rows 0 to 2 of
