@@ -112,19 +112,40 @@ def encounter_kernel(solid: dict[str, Any], surfaces: Surfaces, inertial: bool) 
     return encounter
 
 
+def poses_at(solid: dict[str, Any], surfaces: Surfaces) -> Any:
+    """The function of KS, the solids' numbers and their poses at one time, and of a time.
+
+    It gives the tuple D of the solids, or what KS holds of it where no solid ever moves.
+    """
+    scene, solids = solid["scene"], solid["solids"]
+    if surfaces.moving:
+
+        @jit(flags=EXACT, inline=True)
+        def poses(KS, t):  # type: ignore[no-untyped-def]
+            return solids(scene(KS[0], t))
+
+    else:
+
+        @jit(flags=EXACT, inline=True)
+        def poses(KS, t):  # type: ignore[no-untyped-def]
+            return KS[1]
+
+    return poses
+
+
 def _probes(solid: dict[str, Any], surfaces: Surfaces) -> tuple[Any, Any]:
     """`gap`: the distance of a point at a time; `touch`: that and all that a contact needs."""
-    scene, solids, near, moved = (solid[n] for n in ("scene", "solids", "near", "moved"))
-    starts, moving = surfaces.starts, surfaces.moving
+    near, moved = solid["near"], solid["moved"]
+    poses, starts, moving = poses_at(solid, surfaces), surfaces.starts, surfaces.moving
 
     @jit(flags=EXACT)
     def gap(x, y, z, t, KS):  # type: ignore[no-untyped-def]
-        return near(solids(scene(KS, t)), x, y, z)[0]
+        return near(poses(KS, t), x, y, z)[0]
 
     @jit(flags=EXACT)
     def touch(x, y, z, t, KS):  # type: ignore[no-untyped-def]
         """Distance, normal, surface velocity, restitution and friction at a point and time."""
-        D = solids(scene(KS, t))
+        D = poses(KS, t)
         d, which = near(D, x, y, z)
         e = SLOPE * (1.0 + abs(x) + abs(y) + abs(z))
         nx = gap(x + e, y, z, t, KS) - gap(x - e, y, z, t, KS)
@@ -138,8 +159,8 @@ def _probes(solid: dict[str, Any], surfaces: Surfaces) -> tuple[Any, Any]:
         k = starts[which]
         sx, sy, sz = 0.0, 0.0, 0.0
         if moving:
-            ax, ay, az = moved(D, solids(scene(KS, t - MOMENT)), k, x, y, z)
-            bx, by, bz = moved(D, solids(scene(KS, t + MOMENT)), k, x, y, z)
+            ax, ay, az = moved(D, poses(KS, t - MOMENT), k, x, y, z)
+            bx, by, bz = moved(D, poses(KS, t + MOMENT), k, x, y, z)
             m = 0.5 / MOMENT
             sx, sy, sz = m * (bx - ax), m * (by - ay), m * (bz - az)
         return d, nx, ny, nz, sx, sy, sz, D[k + POSE], D[k + HEAD - 1]
