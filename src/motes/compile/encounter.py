@@ -56,8 +56,13 @@ def encounter_kernel(solid: dict[str, Any], surfaces: Surfaces, inertial: bool) 
             if d > touching(x, y, z):
                 break
             x, y, z = x - d * nx, y - d * ny, z - d * nz
+            settled = d >= -touching(x, y, z)
             if inertial:
-                wx, wy, wz = reflect(wx, wy, wz, contact, 0.0)
+                ux, uy, uz = reflect(wx, wy, wz, contact, 0.0)
+                settled = settled & (ux == wx) & (uy == wy) & (uz == wz)
+                wx, wy, wz = ux, uy, uz
+            if settled:
+                break
         return x, y, z, wx, wy, wz
 
     @jit(flags=EXACT)
@@ -82,13 +87,15 @@ def encounter_kernel(solid: dict[str, Any], surfaces: Surfaces, inertial: bool) 
                 if moving and pull >= 0.0:
                     start = 1e-6
                 elif 2.0 * out <= SHORT * -pull * h:
-                    return x, y, z, w0[0], w0[1], w0[2], t, hits, True
+                    x, y, z, wx, wy, wz = rest(p1[0], p1[1], p1[2], w1, end, KS)
+                    return x, y, z, wx, wy, wz, end, hits, True
                 else:
                     start = min(out / (-pull * h), 1.0)
                 a, b, c = hermite(x, y, z, w0, p1, w1, h, start)
                 g = gap(a, b, c, t + start * h, KS)
                 if g < 0.0:
-                    return x, y, z, w0[0], w0[1], w0[2], t, hits, True
+                    x, y, z, wx, wy, wz = rest(p1[0], p1[1], p1[2], w1, end, KS)
+                    return x, y, z, wx, wy, wz, end, hits, True
         s = 0.0
         if start >= 0.0:
             s = first_impact(x, y, z, w0, p1, w1, t, h, g, start, moving, KS)
