@@ -15,9 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motes.capture import Captures
 from motes.catalog import Component
 from motes.compile.pairs import Law
 from motes.compile.staged import combine
+from motes.constrain import Constraints, Ground
 from motes.errors import SceneError, likely
 from motes.interact.arrange import Box
 from motes.jit import blocks, share
@@ -106,13 +108,15 @@ class Group:
         precision: str,
         strict: bool,
         periodic: Box,
+        solids: Interactions = (),
     ) -> None:
         self.steppers = steppers
         self.interactions = _having(interactions, "accelerations")
         self.exchanges = _having(interactions, "exchange")
-        self._local = tuple(
-            pair for pair in interactions if pair not in (*self.interactions, *self.exchanges)
-        )
+        self._local = _having(interactions, "reach")
+        laws = _having(interactions, "velocities")
+        self.constraints = Constraints(laws, Ground(solids if laws else ()))
+        self.captures = Captures(_having(interactions, "captures"))
         self._strict, self._periodic = strict, periodic
         self.nearby = self._nearby(precision)
         motions = [stepper.system.motion for stepper in steppers.values()]
@@ -120,6 +124,11 @@ class Group:
         who = f"systems {', '.join(steppers)} interact"
         if any(motion.method is not self.method for motion in motions):
             raise SceneError(f"{who} and must have one integrator.")
+        if laws and not isinstance(self.method, Splitting):
+            raise SceneError(
+                f'{who} by "{laws[0][1].name}", a law of velocities, which holds between kick and '
+                'drift: choose integrator = "semi_implicit_euler" or another splitting method.'
+            )
         if not all(motion.inertial for motion in motions):
             raise SceneError(f"{who} and must have velocities: give them a force besides flows.")
 
@@ -127,7 +136,7 @@ class Group:
         laws = []
         for address, part in self._local:
             targets = _named(part, "systems", self.steppers)
-            sources = _named(part, "sources", targets)
+            sources = _named(part, "sources", self.steppers, targets)
             laws.append((Law(address, part, precision, self._strict), targets, sources))
         real = np.float32 if precision == "single" else np.float64
         return Nearby(laws, real, self._periodic)
@@ -156,11 +165,15 @@ class Group:
                 systems[name].motion[:, : alive[name]] = members[name].y
         for address, part in self.exchanges:
             self._exchange(address, part, members, interval, memory)
+        seed = next(iter(self.steppers.values())).seed
+        span = (interval.begin, interval.end)
+        self.captures.find(systems, span, seed, alive, _values)
         for name, stepper in self.steppers.items():
             newborn = np.arange(alive[name], systems[name].count)
             stepper.exceptions(systems[name], newborn, interval)
             stepper.events()
-            stepper.deaths(systems[name], np.arange(systems[name].count), interval)
+            rows, caught = systems[name], self.captures.rows(name)
+            stepper.deaths(rows, np.arange(rows.count), interval, caught)
 
     def _bodies(
         self, systems: dict[str, Particles], alive: dict[str, int], time: float
@@ -180,6 +193,9 @@ class Group:
         self, members: dict[str, _Member], interval: Interval, method: Splitting, memory: Lasting
     ) -> None:
         h = interval.length
+        before = {
+            name: m.y[3:, : m.alive].copy() for name, m in members.items() if self.constraints.laws
+        }
         for kick, drift, place in zip(
             method.kicks, (*method.drifts, 0.0), method.times, strict=True
         ):
@@ -189,6 +205,7 @@ class Group:
                 for member in members.values():
                     member.each("kick", member.K, time, kick * h)
             if drift:
+                self.constraints.apply(members, before, time, drift * h, _partners, _values)
                 memory.push = None
                 for member in members.values():
                     member.each("drift", member.K, time, drift * h)
@@ -299,7 +316,16 @@ def _at(interval: Interval, share: float) -> float:
 
 
 def _having(interactions: Interactions, kernel: str) -> Interactions:
+    """The interactions that define a kernel."""
     return tuple(pair for pair in interactions if type(pair[1]).kernel(kernel) is not None)
+
+
+def named_systems(interaction: Component) -> set[str]:
+    """All systems that an interaction links; none where it names nobody, which means all."""
+    named = set(interaction.values["systems"].document())
+    others = (interaction.values[key].document() for key in ("sources", "hunters")
+              if key in interaction.values)  # fmt: skip
+    return named.union(*others) if named else named
 
 
 def _kernel(interaction: Component, name: str) -> Callable[..., Any]:
@@ -308,8 +334,10 @@ def _kernel(interaction: Component, name: str) -> Callable[..., Any]:
     return function
 
 
-def _named(part: Component, key: str, known: Iterable[str]) -> tuple[str, ...]:
-    """The systems that an interaction names, or all that it could."""
+def _named(
+    part: Component, key: str, known: Iterable[str], otherwise: Iterable[str] = ()
+) -> tuple[str, ...]:
+    """The systems that an interaction names, or others, or all that it could."""
     named = part.values[key].document()
     for name in named:
         if name not in known:
@@ -317,10 +345,10 @@ def _named(part: Component, key: str, known: Iterable[str]) -> tuple[str, ...]:
                 f'interaction "{part.name}": {key} names "{name}", which does not take part in it.'
                 f"{likely(name, known)} There are: {', '.join(known)}."
             )
-    return tuple(sorted(named or known))
+    return tuple(sorted(named or otherwise or known))
 
 
-def _partners(interaction: Component, bodies: list[Bodies]) -> list[Bodies]:
+def _partners(interaction: Component, bodies: list[Any]) -> list[Any]:
     """The bodies that take part in an interaction."""
     named = interaction.values["systems"].document()
     return [body for body in bodies if not named or body.name in named]

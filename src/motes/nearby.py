@@ -22,6 +22,7 @@ from motes.interact.clusters import Part, lists
 from motes.jit import blocks, share
 from motes.state import Particles
 from motes.step import Stepper
+from motes.swarm import Swarm
 
 ALIKE = 1.5
 """Ratio of reaches up to which laws share lists."""
@@ -97,12 +98,14 @@ class Lasting:
     kept: dict[str, tuple[int, int]] = field(default_factory=dict)
     builds: int = 0
     """How often lists were built."""
+    untidy: set[str] = field(default_factory=set)
+    """Systems whose rows are scattered, to be moved before the next step."""
     steps: int = 0
     """How many steps were begun."""
 
     def copy(self) -> Lasting:
         """A copy that shares arrays, which are replaced and never written to."""
-        return replace(self, lists=list(self.lists))
+        return replace(self, lists=list(self.lists), untidy=set(self.untidy))
 
     def arrays(self) -> Iterator[NDArray[Any]]:
         """Everything that can change the next bit."""
@@ -159,7 +162,12 @@ class Nearby:
         self.real, self.periodic = real, periodic
         self.laws = list(laws)
         self.classes: list[Class] = []
-        for one in sorted(laws, key=lambda one: -one[0].reach(0.0)):
+        gathering = [one for one in laws if not one[0].pairwise and not one[0].nearest]
+        self.swarm = Swarm(gathering, real, periodic) if gathering else None
+        if self.swarm is not None and not self.swarm.fits(0.0):
+            self.swarm = None
+        listed = [one for one in laws if self.swarm is None or one not in gathering]
+        for one in sorted(listed, key=lambda one: -one[0].reach(0.0)):
             first = self.classes[-1].laws[0][0] if self.classes else None
             alike = first is not None and first.rebuild == one[0].rebuild
             if first is None or not alike or first.reach(0.0) > ALIKE * one[0].reach(0.0):
@@ -197,6 +205,9 @@ class Nearby:
 
         Lists that do not hold any more, since particles were born or have died, are built anew.
         """
+        for name in sorted(memory.untidy):
+            self._tidy(name, bodies[name], memory)
+        memory.untidy = set()
         memory.lists = memory.lists or [None] * len(self.classes)
         memory.steps += 1
         for k, shared in enumerate(self.classes):
@@ -207,6 +218,15 @@ class Nearby:
             if found is not None and not found.settled:
                 self._reorder(k, set(found.arranged) - moved, bodies, memory)
                 moved |= set(found.arranged)
+
+    def _tidy(self, name: str, body: Body, memory: Lasting) -> None:
+        """Move a swarm's rows into the order of its cells, unless lists order them."""
+        if self.swarm is None or any(name in shared.systems for shared in self.classes):
+            return
+        order = self.swarm.order(body)
+        body.rows.reorder(order)
+        if memory.push is not None:
+            memory.push = {**memory.push, name: memory.push[name][:, order]}
 
     def _reorder(self, k: int, names: set[str], bodies: dict[str, Body], memory: Lasting) -> None:
         """Move rows into the order of one class's cells; all lists keep telling where they are."""
@@ -256,6 +276,8 @@ class Nearby:
         self, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting
     ) -> None:
         """Add the laws' accelerations (3, n) [m/s2] to pushes."""
+        if self.swarm is not None:
+            self.swarm.push(bodies, pushes, memory.untidy)
         memory.lists = memory.lists or [None] * len(self.classes)
         for k, shared in enumerate(self.classes):
             time = next(iter(bodies.values())).time

@@ -168,7 +168,7 @@ class Law:
     @cached_property
     def _module(self) -> tuple[dict[str, Any], int]:
         text = Text(self.precision, self.strict)
-        writer = _Writer(text, self)
+        writer = Writer(text, self)
         width = 3
         if self.pairwise:
             writer.sweep(FORCE, writer.call(FORCE), 3)
@@ -182,7 +182,7 @@ class Law:
         return text.module({"int32": np.int32, "uint32": np.uint32, "choose": choose}), width
 
 
-class _Writer:
+class Writer:
     """Writes one law's loops."""
 
     def __init__(self, text: Text, law: Law) -> None:
@@ -190,7 +190,8 @@ class _Writer:
         self.own, self.other = law.fields
         self._names: dict[str, str] = {}
 
-    def _p(self) -> str:
+    def p(self) -> str:
+        """An expression for `p`, from the array `numbers`."""
         expressions, place = {}, 0
         for key, width in self.law._fields.items():
             expressions[key] = packed([f"numbers[{place + k}]" for k in range(width)])
@@ -237,7 +238,7 @@ class _Writer:
         lines = (
             f"@kernel\ndef sweep_{what}(numbers, targets, sources, cluster, first, entry, itself, "
             "limit, listed, room, best, pick, out):\n"
-            f"    p = {self._p()}\n    quarter = F(0.25) * limit\n"
+            f"    p = {self.p()}\n    quarter = F(0.25) * limit\n"
         )
         lines += "".join(f"    t_{n} = targets[{i}]\n" for i, n in enumerate(own))
         lines += "".join(f"    s_{n} = sources[{i}]\n" for i, n in enumerate(other))
@@ -283,7 +284,7 @@ class _Writer:
         """The loop from sums to accelerations."""
         names, law = self.own, self.law
         lines = "@kernel\ndef finish(numbers, targets, sums, order, push, lo, hi):\n"
-        lines += f"    p = {self._p()}\n"
+        lines += f"    p = {self.p()}\n"
         lines += "".join(f"    t_{n} = targets[{i}]\n" for i, n in enumerate(names))
         lines += "    for i in range(lo, hi):\n"
         lines += "".join(f"        a_{n} = t_{n}[i]\n" for n in names)

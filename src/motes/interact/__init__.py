@@ -14,6 +14,10 @@ masses of all systems that take part, an array (3, n) [m/s2] for each of them; i
 collision or a thermostat, defines `exchange(p, movers, when)`, which changes velocities, and
 returns whether it moved anybody.
 
+A law of velocities defines `velocities(p, walkers, step)`: what the particles may do of what the
+forces want (`constrain.py`). A law of captures defines `captures(p, hunters, prey)`: which
+particles are caught at a step's end (`capture.py`).
+
 Systems that share an interaction are one group and take every stage of a step together.
 """
 
@@ -31,7 +35,8 @@ class _Common:
 
 class _Near(_Common):
     sources: Any = quantity((), table="names")
-    """Systems whose particles are felt by all that take part; all of them when none is named."""
+    """Systems whose particles are felt, also such as `systems` does not name; when none is named,
+    those that take part feel each other."""
 
     skin: Number = quantity(0.1, "", at_least=0, at_most=1, scope="scene")
     """Margin of neighbour lists as a share of the reach: wider lists are longer and last longer."""
@@ -50,7 +55,7 @@ KIND = Kind(
     "interact",
     "interaction",
     "scene",
-    ("accelerations", "force", "near", "exchange"),
+    ("accelerations", "force", "near", "exchange", "velocities", "captures"),
     _Common,
     {"force": _Near, "near": _Gathering},
 )
