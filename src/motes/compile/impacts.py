@@ -139,15 +139,16 @@ def triple(block: Any, i: Any) -> Any:
     return np.float64(block[0, i]), np.float64(block[1, i]), np.float64(block[2, i])
 
 
+@jit(flags=EXACT, inline=True)
+def _no_poses(KS: Any, t: Any, D: Any) -> None:
+    """Where there is no solid."""
+    D[0] = 0.0
+
+
 def _posed(solid: dict[str, Any], surfaces: Surfaces | None) -> Any:
     """The function that writes the solids' poses at a time into an array."""
     if surfaces is None:
-
-        @jit(flags=EXACT, inline=True)
-        def posed(KS, t, D):  # type: ignore[no-untyped-def]
-            D[0] = 0.0
-
-        return posed
+        return _no_poses
     scene, solids = solid["scene"], solid["solids"]
 
     @jit(flags=EXACT, inline=True)
