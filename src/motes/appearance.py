@@ -44,7 +44,11 @@ def _values(control: Control, view: View) -> NDArray[Any]:
     if isinstance(control, Constant) or (isinstance(control, Curve) and control.over == "time"):
         return np.broadcast_to(control.at(view.time), (n, control.width)).astype(np.float32)
     assert isinstance(control, Curve)
-    if control.over == "life":
+    if control.over == "order":
+        from motes.matter import local_order
+
+        place = local_order(view.position)
+    elif control.over == "life":
         place = view.age / view.life
     else:
         place = np.sqrt((view.velocity.astype(float) ** 2).sum(axis=1))

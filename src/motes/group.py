@@ -135,8 +135,9 @@ class Group:
     def _nearby(self, precision: str) -> Nearby:
         laws = []
         for address, part in self._local:
-            targets = _named(part, "systems", self.steppers)
-            sources = _named(part, "sources", self.steppers, targets)
+            partners = _named(part, "systems", self.steppers)
+            targets = _named(part, "targets", self.steppers, partners)
+            sources = _named(part, "sources", self.steppers, partners)
             laws.append((Law(address, part, precision, self._strict), targets, sources))
         real = np.float32 if precision == "single" else np.float64
         return Nearby(laws, real, self._periodic)

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 if TYPE_CHECKING:
     from motes.simulation import Simulation
 
-__all__ = ["Thermo", "lj_melt", "radial_distribution", "thermo"]
+__all__ = ["Thermo", "lj_melt", "local_order", "radial_distribution", "thermo"]
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,33 @@ def radial_distribution(
     shells = 4 / 3 * np.pi * np.diff(edges**3)
     n = max(len(points), 1)
     return (edges[1:] + edges[:-1]) / 2, 2 * count * np.prod(size) / (n * n * shells)
+
+
+def local_order(x: ArrayLike) -> NDArray[np.float64]:
+    """How much the surroundings of points are those of a crystal, from 0 to 1, (n,).
+
+    max(0, 1 - 14 c), with c the centrosymmetry of the 12 nearest neighbours at r_k: the sum over
+    the 6 most opposite pairs of |r_i + r_j|^2, divided by 2 sum |r_k|^2. It is 1 inside a crystal
+    with cubic close packing, and near 0 in a liquid and at a surface. `x`: (n, 3) points [m] in
+    open space. Source: Kelchner, Plimpton and Hamilton, Physical Review B 58 (1998) 11085,
+    equation 1.
+    """
+    from motes.neighbours import nearest
+
+    points = np.asarray(x, float)
+    order = np.zeros(len(points))
+    if len(points) < 13:
+        return order
+    first, second = np.triu_indices(12, 1)
+    neighbours, _ = nearest(points, 12)
+    for begin in range(0, len(points), 1 << 13):
+        rows = slice(begin, begin + (1 << 13))
+        away = points[neighbours[rows]] - points[rows][:, None]
+        sums = ((away[:, first] + away[:, second]) ** 2).sum(axis=2)
+        six = np.sort(sums, axis=1)[:, :6].sum(axis=1)
+        whole = 2 * (away**2).sum(axis=(1, 2))
+        order[rows] = np.maximum(0.0, 1 - 14 * six / whole)
+    return order
 
 
 def lj_melt(cells: int = 20, precision: str = "double") -> Simulation:

@@ -18,6 +18,7 @@ from motes.control.constant import Constant, Setting
 from motes.control.control import Control
 from motes.control.curve import TABLE_SIZE, Curve
 from motes.control.pieces import Pieces, pieces
+from motes.errors import SceneError
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,8 @@ class Values:
 
     def _varying(self, control: Curve) -> list[str]:
         """A curve over life or speed, in pieces or from a table."""
+        if control.over == "order":
+            raise SceneError("a value over order can only be a colour: nothing may move by it.")
         self.over.add(control.over)
         low, high = control.span
         place = "along_life" if control.over == "life" else "speed"

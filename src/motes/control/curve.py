@@ -9,11 +9,19 @@ import numpy as np
 from motes.control.control import Control, Values
 from motes.control.spline import Spline
 
-SCOPE_OF = {"time": "scene", "random": "birth", "life": "particle", "speed": "particle"}
+SCOPE_OF = {
+    "time": "scene",
+    "random": "birth",
+    "life": "particle",
+    "speed": "particle",
+    "order": "particle",
+}
 """What a curve can run over, and the scope that this gives it.
 
 `time` is the scene's time in seconds; `random` a uniform number from 0 to 1 drawn at birth; `life`
-the age divided by the lifetime; `speed` the length of the velocity in m/s.
+the age divided by the lifetime; `speed` the length of the velocity in m/s; `order`, for colours,
+how much a particle's twelve nearest neighbours are a crystal's, from 0 to 1
+(`motes.matter.local_order`).
 """
 
 TABLE_SIZE = 256
@@ -46,7 +54,7 @@ class Curve(Control):
     @property
     def span(self) -> tuple[float, float]:
         """First and last key [s, m/s, or a fraction]; a curve over life spans 0 to 1."""
-        if self.over in ("life", "random"):
+        if self.over in ("life", "random", "order"):
             return 0.0, 1.0
         return float(self.spline.times[0]), float(self.spline.times[-1])
 

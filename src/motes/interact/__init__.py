@@ -34,6 +34,9 @@ class _Common:
 
 
 class _Near(_Common):
+    targets: Any = quantity((), table="names")
+    """Systems that feel the law; all that take part when none is named."""
+
     sources: Any = quantity((), table="names")
     """Systems whose particles are felt, also such as `systems` does not name; when none is named,
     those that take part feel each other."""
