@@ -183,9 +183,7 @@ class Stepper:
         share(care, len(parts))
         self.impacts += sum(impacts)
 
-    def rebounds(
-        self, rows: Particles, ends: NDArray[Any], alive: int, interval: Interval
-    ) -> bool:
+    def rebounds(self, rows: Particles, ends: NDArray[Any], alive: int, interval: Interval) -> bool:
         """Take a group's flight, which leads to `ends` (6, alive), through its impacts.
 
         Returns whether any row ends elsewhere.
@@ -222,9 +220,7 @@ class Stepper:
     def events(self) -> None:
         """Nothing listens to births, impacts and deaths yet; what will goes here."""
 
-    def deaths(
-        self, rows: Particles, exceptional: NDArray[np.int64], interval: Interval
-    ) -> None:
+    def deaths(self, rows: Particles, exceptional: NDArray[np.int64], interval: Interval) -> None:
         """Take out the rows that a retirement claims; the straight pass has marked its own."""
         if not self.system.motion.mortal or not rows.count:
             return

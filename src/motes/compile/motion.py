@@ -9,9 +9,11 @@ from itertools import pairwise
 import numpy as np
 
 from motes.catalog import Component
+from motes.compile import implicit
 from motes.compile.text import AXES, STATE, Call, Text, packed
 from motes.control.control import Control
-from motes.tableau import Explicit, Method, Splitting
+from motes.errors import SceneError
+from motes.tableau import Explicit, Implicit, Method, Splitting
 
 PARTICLE = {"age": "age", "id": "id"}
 """Columns of `q` that the engine computes itself."""
@@ -62,6 +64,8 @@ def write_motion(text: Text, motion: Motion) -> None:
     writer.right_hand_side()
     if isinstance(motion.method, Explicit):
         writer.explicit(motion.method)
+    elif isinstance(motion.method, Implicit):
+        writer.implicit(motion.method)
     else:
         writer.splitting(motion.method)
     if motion.mortal:
@@ -79,6 +83,8 @@ def stage_times(method: Method) -> tuple[float, ...]:
     """Times at which the scene's values are needed, as shares of the step."""
     if isinstance(method, Explicit):
         return method.c
+    if isinstance(method, Implicit):
+        return tuple(method.c[i] for i in implicit.stages(method))
     kicks = method.times
     middles = [(a + b) / 2 for a, b in pairwise(kicks)]
     return tuple(sorted({*kicks, *middles}))
@@ -104,8 +110,6 @@ class _Writer:
         return self.text.record("Q", fields)
 
     def _trait(self, name: str) -> tuple[str, Control]:
-        from motes.errors import SceneError
-
         if name in self.motion.traits:
             return self.motion.traits[name]
         menu = ", ".join(sorted({*self.motion.traits, *PARTICLE}))
@@ -222,15 +226,24 @@ class _Writer:
         lines, stages = "    h2 = h * h\n", []
         for place, row, square in zip(places, table, squares, strict=True):
             start = [f"{a} + F({float(place)!r}) * h * v{a}" if place else a for a in AXES]
-            state = [
-                _sum(s, square, "h2", a) for s, a in zip(start, AXES, strict=True)
-            ] + [_sum(f"v{a}", row, "h", a) for a in AXES]
+            state = [_sum(s, square, "h2", a) for s, a in zip(start, AXES, strict=True)] + [
+                _sum(f"v{a}", row, "h", a) for a in AXES
+            ]
             stages.append(state)
         for i, state in enumerate(stages[:-1]):
             names = tuple(f"{n}_{i}" for n in STATE)
             lines += "".join(f"    {n} = {e}\n" for n, e in zip(names, state, strict=True))
             lines += self._slopes(i, names, method.c[i])
         self._advance(method, lines, stages[-1])
+
+    def implicit(self, method: Implicit) -> None:
+        """`advance` with Newton's method for each stage."""
+        if not self.motion.inertial:
+            raise SceneError(
+                "an implicit integrator is for forces; give a system that flows alone carry another"
+            )
+        self.text.add(implicit.settle_text(self.text.precision))
+        self._advance(method, *implicit.advance_lines(method))
 
     def splitting(self, method: Splitting) -> None:
         """`advance` as kicks and drifts; relaxations are exact, so that no step explodes."""

@@ -96,7 +96,9 @@ def _write_step(
         if wanted:
             prelude += f"    room_of_{name} = empty({CHUNK}, F)\n"
             found += f"        {name} = room_of_{name}[: high - low]\n"
-            found += f"        for i in range(born.size):\n            {name}[i] = F({time} - born[i])\n"
+            found += (
+                f"        for i in range(born.size):\n            {name}[i] = F({time} - born[i])\n"
+            )
     text.add(
         f"@kernel\ndef {'young' if young else 'straight'}{HEAD}{prelude}"
         f"    for low in range(lo, hi, {CHUNK}):\n"
