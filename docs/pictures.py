@@ -24,7 +24,15 @@ LARGEST = 60_000
 INSTANT = 0.6
 """Share of the film at which a still is taken."""
 
-INSTANTS = {"cluster": 0.25, "fireworks": 0.75, "fountain": 0.9, "plummer": 0.1, "ring": 0.4}
+INSTANTS = {
+    "battle": 0.8,
+    "cluster": 0.25,
+    "evacuation": 0.3,
+    "fireworks": 0.75,
+    "fountain": 0.9,
+    "plummer": 0.1,
+    "ring": 0.4,
+}
 """Shares for scenes that are better seen at another time."""
 
 

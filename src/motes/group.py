@@ -16,10 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motes.capture import Captures
 from motes.catalog import Component
 from motes.compile import implicit
 from motes.compile.pairs import Law
 from motes.compile.staged import combine
+from motes.constrain import Constraints, Ground
 from motes.errors import SceneError, SimulationError, likely
 from motes.interact.arrange import Box
 from motes.jit import blocks, share
@@ -28,7 +30,7 @@ from motes.state import Particles
 from motes.step import Interval, Stepper
 from motes.tableau import Explicit, Implicit, Splitting
 
-BLOCK = 1 << 16
+BLOCK = 1 << 14
 """Rows of one kernel call."""
 
 ROUNDED = 1e3
@@ -46,20 +48,43 @@ class Bodies:
     mass: NDArray[Any]
 
 
+@dataclass(frozen=True)
+class Movers:
+    """What an exchange sees of one system and may change: its rows' positions and velocities."""
+
+    name: str
+    position: NDArray[Any]
+    """(3, n) [m]"""
+    velocity: NDArray[Any]
+    """(3, n) [m/s]"""
+    mass: NDArray[Any]
+    """(n,) [kg]"""
+    size: NDArray[Any]
+    """(n,) diameters [m]"""
+    ids: NDArray[np.uint64]
+
+
+@dataclass(frozen=True)
+class Occasion:
+    """When an exchange happens: at the end of a step of a length [s], in a box, at an address."""
+
+    length: float
+    step: int
+    address: str
+    seed: int
+    periodic: Box
+
+
 @dataclass
 class _Member:
-    """One system of the group during a step: state y (6, n), push (3, n) and mass (n,)."""
+    """One system of the group during a step: state y (6, capacity) and push (3, n)."""
 
     stepper: Stepper
     rows: Particles
     alive: int
     y: NDArray[Any]
+    """The particles' own positions and velocities, or a copy where a flight has to be kept."""
     push: NDArray[Any]
-
-    def store(self) -> None:
-        """Write the state back into the particles' columns."""
-        self.rows.position[:, : self.alive] = self.y[:3]
-        self.rows.velocity[:, : self.alive] = self.y[3:]
 
     def each(self, name: str, *arguments: Any) -> None:
         """Run one of the system's staged kernels over all rows that were alive."""
@@ -69,7 +94,8 @@ class _Member:
 
     def body(self, time: float) -> Body:
         """The system as laws of limited reach see it."""
-        return Body(self.stepper, self.rows, self.alive, self.y[:3], self.y[3:], time)
+        x, v = self.y[:3, : self.alive], self.y[3:, : self.alive]
+        return Body(self.stepper, self.rows, self.alive, x, v, time)
 
     @property
     def K(self) -> Any:
@@ -87,10 +113,15 @@ class Group:
         precision: str,
         strict: bool,
         periodic: Box,
+        solids: Interactions = (),
     ) -> None:
         self.steppers = steppers
-        self.interactions = tuple(pair for pair in interactions if _global(pair[1]))
-        self._local = tuple(pair for pair in interactions if not _global(pair[1]))
+        self.interactions = _having(interactions, "accelerations")
+        self.exchanges = _having(interactions, "exchange")
+        self._local = _having(interactions, "reach")
+        laws = _having(interactions, "velocities")
+        self.constraints = Constraints(laws, Ground(solids if laws else ()))
+        self.captures = Captures(_having(interactions, "captures"))
         self._strict, self._periodic = strict, periodic
         self.nearby = self._nearby(precision)
         motions = [stepper.system.motion for stepper in steppers.values()]
@@ -98,6 +129,11 @@ class Group:
         who = f"systems {', '.join(steppers)} interact"
         if any(motion.method is not self.method for motion in motions):
             raise SceneError(f"{who} and must have one integrator.")
+        if laws and not isinstance(self.method, Splitting):
+            raise SceneError(
+                f'{who} by "{laws[0][1].name}", a law of velocities, which holds between kick and '
+                'drift: choose integrator = "semi_implicit_euler" or another splitting method.'
+            )
         if not all(motion.inertial for motion in motions):
             raise SceneError(f"{who} and must have velocities: give them a force besides flows.")
 
@@ -105,7 +141,7 @@ class Group:
         laws = []
         for address, part in self._local:
             targets = _named(part, "systems", self.steppers)
-            sources = _named(part, "sources", targets)
+            sources = _named(part, "sources", self.steppers, targets)
             laws.append((Law(address, part, precision, self._strict), targets, sources))
         real = np.float32 if precision == "single" else np.float64
         return Nearby(laws, real, self._periodic)
@@ -130,13 +166,21 @@ class Group:
         else:
             self._runge_kutta(members, interval, self.method, memory)
         for name, stepper in self.steppers.items():
-            if stepper.rebounds(systems[name], members[name].y, alive[name], interval):
-                memory.push = None
-            members[name].store()
+            if stepper.system.surfaces is not None:
+                if stepper.rebounds(systems[name], members[name].y, alive[name], interval):
+                    memory.push = None
+                systems[name].motion[:, : alive[name]] = members[name].y
+        for address, part in self.exchanges:
+            self._exchange(address, part, members, interval, memory)
+        seed = next(iter(self.steppers.values())).seed
+        span = (interval.begin, interval.end)
+        self.captures.find(systems, span, seed, alive, _values)
+        for name, stepper in self.steppers.items():
             newborn = np.arange(alive[name], systems[name].count)
             stepper.exceptions(systems[name], newborn, interval)
             stepper.events()
-            stepper.deaths(systems[name], np.arange(systems[name].count), interval)
+            rows, caught = systems[name], self.captures.rows(name)
+            stepper.deaths(rows, np.arange(rows.count), interval, caught)
 
     def _bodies(
         self, systems: dict[str, Particles], alive: dict[str, int], time: float
@@ -148,13 +192,17 @@ class Group:
         return found
 
     def _member(self, name: str, rows: Particles, alive: int) -> _Member:
-        y = np.concatenate([rows.position[:, :alive], rows.velocity[:, :alive]])
-        return _Member(self.steppers[name], rows, alive, y, np.zeros((3, alive), rows.real))
+        stepper = self.steppers[name]
+        y = rows.motion if stepper.system.surfaces is None else rows.motion[:, :alive].copy()
+        return _Member(stepper, rows, alive, y, np.zeros((3, 0), rows.real))
 
     def _split(
         self, members: dict[str, _Member], interval: Interval, method: Splitting, memory: Lasting
     ) -> None:
         h = interval.length
+        before = {
+            name: m.y[3:, : m.alive].copy() for name, m in members.items() if self.constraints.laws
+        }
         for kick, drift, place in zip(
             method.kicks, (*method.drifts, 0.0), method.times, strict=True
         ):
@@ -164,6 +212,7 @@ class Group:
                 for member in members.values():
                     member.each("kick", member.K, time, kick * h)
             if drift:
+                self.constraints.apply(members, before, time, drift * h, _partners, _values)
                 memory.push = None
                 for member in members.values():
                     member.each("drift", member.K, time, drift * h)
@@ -172,8 +221,8 @@ class Group:
         self, members: dict[str, _Member], interval: Interval, method: Explicit, memory: Lasting
     ) -> None:
         h, s = interval.length, method.stages
-        bases = {name: m.y.copy() for name, m in members.items()}
-        slopes = {name: np.zeros((s, *m.y.shape), m.y.dtype) for name, m in members.items()}
+        bases = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
+        slopes = {name: np.zeros((s, 6, m.alive), m.y.dtype) for name, m in members.items()}
         for i, row in enumerate((*method.a, method.b)):
             _combine(members, bases, slopes, row, h)
             memory.push = None
@@ -193,9 +242,9 @@ class Group:
         one particle alone, and damping, may be as stiff as they like.
         """
         h = interval.length
-        bases = {name: m.y.copy() for name, m in members.items()}
+        bases = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
         places = implicit.stages(method)
-        slopes = {n: np.zeros((len(places), *m.y.shape), m.y.dtype) for n, m in members.items()}
+        slopes = {n: np.zeros((len(places), 6, m.alive), m.y.dtype) for n, m in members.items()}
         for place, i in enumerate(places):
             _combine(members, bases, slopes, [method.a[i][j] for j in places[:place]], h)
             memory.push = None
@@ -205,15 +254,17 @@ class Group:
                 for name, member in members.items():
                     member.each("slope", slopes[name][place], member.K, time)
                 continue
-            known = {name: m.y.copy() for name, m in members.items()}
+            known = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
             last = math.inf
             for _ in range(implicit.ITERATIONS):
-                before = {name: m.y.copy() for name, m in members.items()}
+                before = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
                 self._interact(members, time, memory)
                 memory.push = None
                 for name, member in members.items():
                     member.each("settled", known[name], member.K, time, g)
-                change = max(_change(m.y, before[name]) for name, m in members.items())
+                change = max(
+                    _change(m.y[:, : m.alive], before[name]) for name, m in members.items()
+                )
                 if change <= 1 or not change < last:
                     break
                 last = change
@@ -223,7 +274,7 @@ class Group:
                     f"interaction is too stiff for its length, {h:g} s. Try a smaller step."
                 )
             for name, m in members.items():
-                slopes[name][place] = (m.y - known[name]) / m.y.dtype.type(g)
+                slopes[name][place] = (m.y[:, : m.alive] - known[name]) / m.y.dtype.type(g)
         _combine(members, bases, slopes, [method.b[i] for i in places], h)
         memory.push = None
 
@@ -245,7 +296,9 @@ class Group:
         pushes = {name: np.zeros((3, m.alive), m.y.dtype) for name, m in members.items()}
         if self.interactions:
             bodies = [
-                Bodies(name, m.y[:3], m.stepper.mass(m.rows, m.alive))
+                Bodies(
+                    name, np.ascontiguousarray(m.y[:3, : m.alive]), m.stepper.mass(m.rows, m.alive)
+                )
                 for name, m in members.items()
             ]
             for _, interaction in self.interactions:
@@ -257,6 +310,28 @@ class Group:
             near = {name: member.body(time) for name, member in members.items()}
             self.nearby.push(near, pushes, memory)
         return pushes
+
+    def _exchange(
+        self,
+        address: str,
+        part: Component,
+        members: dict[str, _Member],
+        interval: Interval,
+        memory: Lasting,
+    ) -> None:
+        """Let particles exchange motion at a step's end."""
+        p, chosen = _values(part, interval.end), _named(part, "systems", members)
+        movers, seed = [], 0
+        for name in chosen:
+            member = members[name]
+            rows, n, stepper = member.rows, member.alive, member.stepper
+            mass, seed = stepper.mass(rows, n), int(stepper.seed)
+            size = stepper.trait("size", rows, n, interval.end)
+            x, v = rows.position[:, :n], rows.velocity[:, :n]
+            movers.append(Movers(name, x, v, mass, size, rows.ids[:n]))
+        when = Occasion(interval.length, memory.steps, address, seed, self._periodic)
+        if _kernel(part, "exchange")(p, movers, when):
+            memory.push = None
 
     def energy(self, systems: dict[str, Particles], time: float) -> float:
         """Potential energy [J] of the interactions that define one."""
@@ -287,8 +362,17 @@ def _at(interval: Interval, share: float) -> float:
     return interval.end if share == 1.0 else interval.begin + share * interval.length
 
 
-def _global(interaction: Component) -> bool:
-    return type(interaction).kernel("accelerations") is not None
+def _having(interactions: Interactions, kernel: str) -> Interactions:
+    """The interactions that define a kernel."""
+    return tuple(pair for pair in interactions if type(pair[1]).kernel(kernel) is not None)
+
+
+def named_systems(interaction: Component) -> set[str]:
+    """All systems that an interaction links; none where it names nobody, which means all."""
+    named = set(interaction.values["systems"].document())
+    others = (interaction.values[key].document() for key in ("sources", "hunters")
+              if key in interaction.values)  # fmt: skip
+    return named.union(*others) if named else named
 
 
 def _combine(
@@ -323,8 +407,10 @@ def _kernel(interaction: Component, name: str) -> Callable[..., Any]:
     return function
 
 
-def _named(part: Component, key: str, known: Iterable[str]) -> tuple[str, ...]:
-    """The systems that an interaction names, or all that it could."""
+def _named(
+    part: Component, key: str, known: Iterable[str], otherwise: Iterable[str] = ()
+) -> tuple[str, ...]:
+    """The systems that an interaction names, or others, or all that it could."""
     named = part.values[key].document()
     for name in named:
         if name not in known:
@@ -332,10 +418,10 @@ def _named(part: Component, key: str, known: Iterable[str]) -> tuple[str, ...]:
                 f'interaction "{part.name}": {key} names "{name}", which does not take part in it.'
                 f"{likely(name, known)} There are: {', '.join(known)}."
             )
-    return tuple(sorted(named or known))
+    return tuple(sorted(named or otherwise or known))
 
 
-def _partners(interaction: Component, bodies: list[Bodies]) -> list[Bodies]:
+def _partners(interaction: Component, bodies: list[Any]) -> list[Any]:
     """The bodies that take part in an interaction."""
     named = interaction.values["systems"].document()
     return [body for body in bodies if not named or body.name in named]

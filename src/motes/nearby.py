@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.compile.pairs import FORCE, LISTED, POTENTIAL, VIRIAL, Law
+from motes.control.curve import Curve
 from motes.errors import SceneError, SimulationError
 from motes.interact.arrange import Arranged, Box, Packing, arrange, common_grid, wrapped
 from motes.interact.clusters import Part, lists
 from motes.jit import blocks, share
 from motes.state import Particles
 from motes.step import Stepper
+from motes.swarm import Swarm
 
 ALIKE = 1.5
 """Ratio of reaches up to which laws share lists."""
@@ -28,7 +30,7 @@ ALIKE = 1.5
 CAUTION = 1 - 2.0**-10
 """Share of the allowed way after which a list is stale: more than rounding takes away."""
 
-ROWS = 1 << 15
+ROWS = 1 << 14
 """Rows of one task of a loop that is quick."""
 
 
@@ -53,6 +55,11 @@ class Body:
         """Masses (n,) [kg]."""
         return self.stepper.mass(self.rows, self.alive)
 
+    def lasts(self, name: str) -> bool:
+        """Whether a number of every particle never changes."""
+        traits = self.stepper.system.motion.traits
+        return name in traits and not isinstance(traits[name][1], Curve)
+
     def column(self, name: str) -> NDArray[Any]:
         """A number of every particle: v and an axis, or a trait."""
         if name in ("vx", "vy", "vz"):
@@ -74,6 +81,8 @@ class Lists:
     """Rows and deaths for which they hold."""
     step: int = 0
     """Number of the step in which they were built."""
+    columns: dict[tuple[str, str], NDArray[Any]] = field(default_factory=dict)
+    """What does not change while they hold, by system and name, in the order of slots."""
     settled: bool = False
     """Whether rows are in the order of cells."""
 
@@ -89,12 +98,14 @@ class Lasting:
     kept: dict[str, tuple[int, int]] = field(default_factory=dict)
     builds: int = 0
     """How often lists were built."""
+    untidy: set[str] = field(default_factory=set)
+    """Systems whose rows are scattered, to be moved before the next step."""
     steps: int = 0
     """How many steps were begun."""
 
     def copy(self) -> Lasting:
         """A copy that shares arrays, which are replaced and never written to."""
-        return replace(self, lists=list(self.lists))
+        return replace(self, lists=list(self.lists), untidy=set(self.untidy))
 
     def arrays(self) -> Iterator[NDArray[Any]]:
         """Everything that can change the next bit."""
@@ -151,7 +162,12 @@ class Nearby:
         self.real, self.periodic = real, periodic
         self.laws = list(laws)
         self.classes: list[Class] = []
-        for one in sorted(laws, key=lambda one: -one[0].reach(0.0)):
+        gathering = [one for one in laws if not one[0].pairwise and not one[0].nearest]
+        self.swarm = Swarm(gathering, real, periodic) if gathering else None
+        if self.swarm is not None and not self.swarm.fits(0.0):
+            self.swarm = None
+        listed = [one for one in laws if self.swarm is None or one not in gathering]
+        for one in sorted(listed, key=lambda one: -one[0].reach(0.0)):
             first = self.classes[-1].laws[0][0] if self.classes else None
             alike = first is not None and first.rebuild == one[0].rebuild
             if first is None or not alike or first.reach(0.0) > ALIKE * one[0].reach(0.0):
@@ -189,6 +205,9 @@ class Nearby:
 
         Lists that do not hold any more, since particles were born or have died, are built anew.
         """
+        for name in sorted(memory.untidy):
+            self._tidy(name, bodies[name], memory)
+        memory.untidy = set()
         memory.lists = memory.lists or [None] * len(self.classes)
         memory.steps += 1
         for k, shared in enumerate(self.classes):
@@ -199,6 +218,15 @@ class Nearby:
             if found is not None and not found.settled:
                 self._reorder(k, set(found.arranged) - moved, bodies, memory)
                 moved |= set(found.arranged)
+
+    def _tidy(self, name: str, body: Body, memory: Lasting) -> None:
+        """Move a swarm's rows into the order of its cells, unless lists order them."""
+        if self.swarm is None or any(name in shared.systems for shared in self.classes):
+            return
+        order = self.swarm.order(body)
+        body.rows.reorder(order)
+        if memory.push is not None:
+            memory.push = {**memory.push, name: memory.push[name][:, order]}
 
     def _reorder(self, k: int, names: set[str], bodies: dict[str, Body], memory: Lasting) -> None:
         """Move rows into the order of one class's cells; all lists keep telling where they are."""
@@ -248,6 +276,8 @@ class Nearby:
         self, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting
     ) -> None:
         """Add the laws' accelerations (3, n) [m/s2] to pushes."""
+        if self.swarm is not None:
+            self.swarm.push(bodies, pushes, memory.untidy)
         memory.lists = memory.lists or [None] * len(self.classes)
         for k, shared in enumerate(self.classes):
             time = next(iter(bodies.values())).time
@@ -291,8 +321,17 @@ class Nearby:
                     parts = found.arranged[name].real, found.arranged[name].ghosts
                     columns[then] = np.concatenate([*(p.position[axis] for p in parts), [0]])
             for field_ in sorted(wanted[name] - set(columns)):
-                columns[field_] = self._space((name, field_), (size,))
-                packing.values(body.column(field_), columns[field_])
+                kept = found.columns.get((name, field_))
+                if kept is None:
+                    lasts = body.lasts(field_)
+                    room = (
+                        np.empty(size, self.real) if lasts else self._space((name, field_), (size,))
+                    )
+                    packing.values(body.column(field_), room)
+                    kept = room
+                    if lasts:
+                        found.columns[name, field_] = room
+                columns[field_] = kept
             packed[name] = columns
         return packed, float(np.sqrt(moved))
 
@@ -314,23 +353,26 @@ class Nearby:
         out[:] = 0
         own, other = law.fields
         mine = tuple(packed[target][name] for name in own)
-        numbers = law.numbers(time, self.real)
         limit, listed = self.real(law.reach(time)) ** 2, self.real(found.radius) ** 2
         kernel = law.sweep(what)
         for source in sources:
+            numbers = law.numbers(time, self.real, (target, source))
             theirs = tuple(packed[source][name] for name in other)
             parts = found.near[target, source]
 
             def sweep(
-                k: int, theirs: Any = theirs, parts: Any = parts, source: str = source
+                k: int,
+                numbers: Any = numbers,
+                theirs: Any = theirs,
+                parts: Any = parts,
+                source: str = source,
             ) -> None:
                 part = parts[k]
-                longest = int(np.diff(part.first).max(initial=1))
-                room: NDArray[Any] = np.empty((len(other), longest), self.real)
+                room: NDArray[Any] = np.empty((len(other), part.longest), self.real)
                 best: NDArray[Any] = np.empty(max(law.nearest, 1), self.real)
                 pick = np.empty(max(law.nearest, 1), np.int64)
                 kernel(
-                    numbers, mine, theirs, *part, source == target, limit, listed, room, best,
+                    numbers, mine, theirs, *part[:3], source == target, limit, listed, room, best,
                     pick, out,
                 )  # fmt: skip
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from motes.appearance import Look
+from motes.capture import CAPTURE
 from motes.catalog import Component, find
 from motes.compile.motion import Motion
 from motes.compile.system import CompiledSystem
@@ -17,7 +18,7 @@ from motes.diagnose import explain_infinity
 from motes.emission import Clock
 from motes.errors import SceneError, SimulationError, likely
 from motes.frame import Frame
-from motes.group import Group
+from motes.group import Group, named_systems
 from motes.integrate import method
 from motes.interact.arrange import Box, wrapped
 from motes.nearby import Lasting
@@ -88,6 +89,7 @@ class Simulation:
             tuple((component_address(system, r), r) for r in retire),
             traits,
             method(system.integrator or scene.integrator),
+            addressed(scene.solid, ()),
         )
         emitters = addressed((), system.emit)
         compiled = CompiledSystem(
@@ -98,8 +100,7 @@ class Simulation:
 
     def _grouped(self) -> list[Group]:
         """Groups of systems that interact, directly or through others."""
-        links = [set(part.values["systems"].document()) for part in self.scene.interact]
-        links = [link or set(self._steppers) for link in links]
+        links = [named_systems(part) or set(self._steppers) for part in self.scene.interact]
         for part, link in zip(self.scene.interact, links, strict=True):
             for name in sorted(link - set(self._steppers)):
                 raise SceneError(
@@ -122,6 +123,7 @@ class Simulation:
                 self.scene.precision,
                 self.scene.mode == "strict",
                 self._periodic,
+                tuple((component_address(None, part), part) for part in self.scene.solid),
             )
             for group in groups
         ]
@@ -145,6 +147,12 @@ class Simulation:
     def impacts(self) -> int:
         """Impacts on solids so far."""
         return sum(s.impacts for s in self._steppers.values())
+
+    @property
+    def captures(self) -> NDArray[Any]:
+        """Captures so far, by time: structured, time [s], hunter and prey (ids), place [m]."""
+        kept = [part for group in self._groups for part in group.captures.kept]
+        return np.sort(np.concatenate([np.zeros(0, CAPTURE), *kept]), order=("time", "prey"))
 
     def __getitem__(self, name: str) -> View:
         if name not in self._systems:
@@ -284,12 +292,15 @@ class Simulation:
         """A copy of the state, taken to a time beyond it by steps and a partial one."""
         state = self._state.copy()
         impacts = {name: s.impacts for name, s in self._steppers.items()}
+        captures = [len(group.captures.kept) for group in self._groups]
         while (ahead := time - self._step_begin(state)) > EDGE * self.scene.step:
             whole = ahead > (1 - EDGE) * self.scene.step
             end = self._step_begin(state, 1) if whole else time
             self._advance(state, Interval(self._step_begin(state), end))
         for name, stepper in self._steppers.items():
             stepper.impacts = impacts[name]
+        for group, length in zip(self._groups, captures, strict=True):
+            del group.captures.kept[length:]
         return state, time
 
     def frames(self, first: int | None = None, last: int | None = None) -> Iterator[Frame]:

@@ -40,6 +40,8 @@ class Particles:
     count: int = 0
     deaths: int = 0
     """How many have died so far; with the count it tells whether rows are still the same."""
+    motion: NDArray[Any] = field(init=False)
+    """Positions and velocities in one block, (6, capacity)."""
     position: NDArray[Any] = field(init=False)
     velocity: NDArray[Any] = field(init=False)
     birth: NDArray[np.float64] = field(init=False)
@@ -58,10 +60,9 @@ class Particles:
 
     def _allocate(self, rows: int) -> None:
         what = f'system "{self.name}" with {rows} rows'
-        motion = allocate((6 if self.moves else 3, rows), self.real, what)
-        self.position, self.velocity = motion[:3], motion[3:]
-        if not self.moves:
-            self.velocity = np.zeros((3, 0), self.real)
+        self.motion = allocate((6 if self.moves else 3, rows), self.real, what)
+        self.position = self.motion[:3]
+        self.velocity = self.motion[3:] if self.moves else np.zeros((3, 0), self.real)
         self.birth = allocate((rows,), np.float64, what)
         self.ids = allocate((rows,), np.uint64, what)
         width = sum(w for _, w in self.widths)

@@ -18,7 +18,7 @@ from motes.compile.straight import THREATENED
 from motes.compile.system import CompiledSystem
 from motes.emission import Clock, Source
 from motes.errors import SceneError
-from motes.jit import blocks, share
+from motes.jit import blocks, bound, share
 from motes.state import Particles
 
 LARGEST_BLOCK = 1 << 18
@@ -154,12 +154,14 @@ class Stepper:
         parts = _parts(last - first, 1)
         found = [NOTHING] * len(parts)
 
+        step = bound(
+            kernel, rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
+            interval.begin, interval.end,
+        )  # fmt: skip
+
         def straight(k: int) -> None:
             low, high = first + parts[k][0], first + parts[k][1]
-            kernel(
-                rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
-                interval.begin, interval.end, low, high,
-            )  # fmt: skip
+            step(low, high)
             if self.system.surfaces is not None:
                 found[k] = _marked(flags, low, high)
 
@@ -220,11 +222,22 @@ class Stepper:
     def events(self) -> None:
         """Nothing listens to births, impacts and deaths yet; what will goes here."""
 
-    def deaths(self, rows: Particles, exceptional: NDArray[np.int64], interval: Interval) -> None:
-        """Take out the rows that a retirement claims; the straight pass has marked its own."""
-        if not self.system.motion.mortal or not rows.count:
+    def deaths(
+        self,
+        rows: Particles,
+        exceptional: NDArray[np.int64],
+        interval: Interval,
+        caught: NDArray[np.int64] = NOTHING,
+    ) -> None:
+        """Take out the rows that were caught, and those that a retirement claims; the straight pass
+        has marked its own.
+        """
+        mortal = self.system.motion.mortal
+        if not rows.count or not (mortal or caught.size):
             return
-        flags, parts = self._flags(rows), _parts(exceptional.size, 1)
+        flags, parts = self._flags(rows), _parts(exceptional.size if mortal else 0, 1)
+        if not mortal:
+            flags[: rows.count] = 0
 
         def retire(k: int) -> None:
             low, high = parts[k]
@@ -234,6 +247,7 @@ class Stepper:
             )  # fmt: skip
 
         share(retire, len(parts))
+        flags[caught] = 1
         rows.keep(flags)
 
     def _flags(self, rows: Particles) -> NDArray[np.uint8]:

@@ -15,6 +15,7 @@ from motes.compile.surfaces import write_surfaces
 from motes.compile.text import Text
 from motes.control.control import Control
 from motes.control.curve import Curve
+from motes.figure import assembled
 from motes.frame import Frame
 from motes.renderer import Camera, Film, Layer, Picture, Renderer, Sky, Solids, Stars, Sun
 from motes.scene.address import component_address
@@ -89,6 +90,13 @@ class Studio:
 
     def _layer(self, name: str, columns: Mapping[str, NDArray[Any]], time: float) -> Layer:
         look = next(s.look for s in self.scene.systems if s.name == name)
+        figure = type(look).kernel("figure")
+        if figure is not None:
+            p = SimpleNamespace(upright=vars(type(look))["upright"])
+            for key in look.own:
+                value = look.values[key].at(time)
+                setattr(p, key, float(value[0]) if value.size == 1 else value)
+            columns = assembled(figure, p, columns, time)
         return Layer(
             position=columns["position"],
             velocity=columns["velocity"],

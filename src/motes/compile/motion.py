@@ -10,13 +10,32 @@ import numpy as np
 
 from motes.catalog import Component
 from motes.compile import implicit
+from motes.compile.surfaces import write_surfaces
 from motes.compile.text import AXES, STATE, Call, Text, packed
 from motes.control.control import Control
 from motes.errors import SceneError
 from motes.tableau import Explicit, Implicit, Method, Splitting
 
-PARTICLE = {"age": "age", "id": "id"}
+PARTICLE = {"age": "age", "id": "id", "obstacle": "obstacle"}
 """Columns of `q` that the engine computes itself."""
+
+SEEN = """@inline
+def seen(S, x, y, z):
+    D = seen_solids(S)
+    gap, _ = seen_near(D, x, y, z)
+    e = F(1e-3) * (F(1.0) + abs(x) + abs(y) + abs(z))
+    a, _ = seen_near(D, x + e, y - e, z - e)
+    b, _ = seen_near(D, x - e, y - e, z + e)
+    c, _ = seen_near(D, x - e, y + e, z - e)
+    d, _ = seen_near(D, x + e, y + e, z + e)
+    nx, ny, nz = a - b - c + d, c + d - a - b, b + d - a - c
+    n = F(1.0) / sqrt(nx * nx + ny * ny + nz * nz + F(1e-30))
+    return gap, n * nx, n * ny, n * nz
+"""
+"""Distance from the nearest solid, and its normal from four points around."""
+
+NOTHING_SEEN = "@inline\ndef seen(S, x, y, z):\n    return F(1e9), F(0.0), F(0.0), F(1.0)\n"
+"""Without solids the nearest is far below."""
 
 KEPT = ("life", "mass")
 """Traits whose value at birth holds for life."""
@@ -32,6 +51,13 @@ class Motion:
     traits: dict[str, tuple[str, Control]]
     """Values of the system by name (life, mass, size, color): address and control."""
     method: Method
+    solids: tuple[tuple[str, Component], ...] = ()
+    """The scene's solids, for forces that need to see obstacles."""
+
+    @property
+    def limits(self) -> bool:
+        """Whether anything limits the accelerations."""
+        return any(c.kernel("limited") for _, c in self.forces)
 
     @property
     def inertial(self) -> bool:
@@ -122,6 +148,8 @@ class _Writer:
             lines += f"    along_life = age / {packed(self._life())}\n"
         if "speed" in self.text.values.over:
             lines += "    speed = sqrt(vx * vx + vy * vy + vz * vz)\n"
+        if "obstacle" in self.motion.needs():
+            lines += "    obstacle = seen(S, x, y, z)\n"
         return lines
 
     def _life(self) -> list[str]:
@@ -147,6 +175,10 @@ class _Writer:
 
     def right_hand_side(self) -> None:
         """`carried`: the flows' velocity; `pushed`: acceleration and relaxation, all forces."""
+        if "obstacle" in self.motion.needs():
+            if self.motion.solids:
+                write_surfaces(self.text, self.motion.solids, "seen_")
+            self.text.add(SEEN if self.motion.solids else NOTHING_SEEN)
         arguments = ", ".join(STATE)
         calls = [self._call(address, c, "velocity") for address, c in self.motion.flows]
         direct: list[Call] = []
@@ -174,6 +206,20 @@ class _Writer:
                 if not call.always_zero(i)
             )
         self.text.add(f"@inline\ndef pushed{head}{body}    return ax, ay, az, k, bx, by, bz\n")
+        if self.motion.limits:
+            self._limits(arguments)
+
+    def _limits(self, arguments: str) -> None:
+        """`limited`: what the body can do of a sum of accelerations."""
+        lines = self._preamble()
+        for address, c in self.motion.forces:
+            if c.kernel("limited") is not None:
+                given = f"{self.particle}, t, ax, ay, az"
+                lines += f"    ax, ay, az = {self.text.call(c, address, 'limited', given).source}\n"
+        self.text.add(
+            f"@inline\ndef limited({arguments}, age, C, S, L, t, ax, ay, az):\n"
+            f"{lines}    return ax, ay, az\n"
+        )
 
     def _slopes(self, i: int, state: tuple[str, ...], share: float) -> str:
         """Source for the slopes k of stage i at a state."""
@@ -186,6 +232,9 @@ class _Writer:
             flow = f" + u{axis}{i}" if self.motion.flows else ""
             lines += f"    k{axis}{i} = {v}{flow}\n"
         lines += f"    ax{i}, ay{i}, az{i}, r, bx, by, bz = pushed{call}\n"
+        if self.motion.limits:
+            a = f"ax{i}, ay{i}, az{i}"
+            lines += f"    {a} = limited{call[:-1]}, {a})\n"
         for axis, v in zip(AXES, velocity, strict=True):
             lines += f"    a{axis}{i} += b{axis} - r * {v}\n"
         return lines
@@ -262,6 +311,8 @@ class _Writer:
     def _kick(self, share: float, i: int, begin: float) -> str:
         call = f"({', '.join(STATE)}, age + F({begin!r}) * h, C, S{i}, L, t{i})"
         lines = f"    ax, ay, az, r, bx, by, bz = pushed{call}\n"
+        if self.motion.limits:
+            lines += f"    ax, ay, az = limited{call[:-1]}, ax, ay, az)\n"
         lines += f"    g = F({share!r}) * h\n"
         if self.motion.relaxes:
             lines += "    g *= phi1(r * g)\n"

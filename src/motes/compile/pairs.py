@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from motes.catalog import Component
 from motes.catalog.source import function_node
 from motes.compile.text import AXES, STATE, Text, packed
-from motes.control.constant import Setting
+from motes.control.constant import Constant, Setting
 from motes.errors import SceneError
 from motes.jit import jit
 from motes.kernel.language import can_fold
@@ -45,6 +46,7 @@ class Law:
         self.nearest = int(nearest)
         self.rebuild = int(part.values["rebuild"].document())
         self.owner = f'interaction "{part.name}"'
+        self._last: tuple[float, dict[tuple[str, str], dict[str, Any]]] = (float("nan"), {})
         self._missing()
 
     def _missing(self) -> None:
@@ -60,9 +62,20 @@ class Law:
 
     # ------------------------------------------------------------------ numbers
 
-    def values(self, time: float) -> dict[str, Any]:
-        """Parameters, and the constants that follow from them, at a time."""
-        from types import SimpleNamespace
+    def values(self, time: float, pair: tuple[str, str] = ("", "")) -> dict[str, Any]:
+        """Parameters, and the constants that follow from them, at a time.
+
+        `pair`: target and source, for laws that mix what two species have.
+        """
+        if self._last[0] != time:
+            self._last = time, {}
+        if type(self.part).kernel("mixed") is None:
+            pair = ("", "")
+        if pair not in self._last[1]:
+            self._last[1][pair] = self._values(time, pair)
+        return self._last[1][pair]
+
+    def _values(self, time: float, pair: tuple[str, str]) -> dict[str, Any]:
 
         found: dict[str, Any] = {}
         for key, control in self.part.values.items():
@@ -71,14 +84,15 @@ class Law:
             else:
                 value = control.at(time)
                 found[key] = float(value[0]) if value.size == 1 else tuple(map(float, value))
-        if (constants := type(self.part).kernel("constants")) is not None:
+        constants, mixed = (type(self.part).kernel(k) for k in ("constants", "mixed"))
+        own = mixed(SimpleNamespace(**found), *pair) if mixed else {}
+        found |= {key: value for key, value in own.items() if key in found}
+        if constants is not None:
             found |= constants(SimpleNamespace(**found))
-        return found
+        return found | own
 
     def reach(self, time: float) -> float:
         """Support radius at a time [m]."""
-        from types import SimpleNamespace
-
         return float(self._kernel("reach")(SimpleNamespace(**self.values(time))))
 
     @cached_property
@@ -87,13 +101,15 @@ class Law:
         fields: dict[str, int] = {}
         common = set(self.part.parameters) - self.part.own
         for key, value in self.values(0.0).items():
-            if key not in common and not isinstance(value, str | list):
+            if (key not in common and not isinstance(value, str | list | dict | tuple | None)) or (
+                isinstance(value, tuple) and value and not isinstance(value[0], str)
+            ):
                 fields[key] = len(value) if isinstance(value, tuple) else 1
         return fields
 
-    def numbers(self, time: float, real: type) -> NDArray[Any]:
+    def numbers(self, time: float, real: type, pair: tuple[str, str] = ("", "")) -> NDArray[Any]:
         """All numbers of `p`, as kernels read them."""
-        values = self.values(time)
+        values = self.values(time, pair)
         return np.array([x for key in self._fields for x in np.atleast_1d(values[key])], real)
 
     # ------------------------------------------------------------------ fields of particles
@@ -152,7 +168,7 @@ class Law:
     @cached_property
     def _module(self) -> tuple[dict[str, Any], int]:
         text = Text(self.precision, self.strict)
-        writer = _Writer(text, self)
+        writer = Writer(text, self)
         width = 3
         if self.pairwise:
             writer.sweep(FORCE, writer.call(FORCE), 3)
@@ -163,10 +179,10 @@ class Law:
             width = _returned(self._kernel("near"), self.owner)
             writer.sweep("near", writer.call("near"), width)
         writer.finish(width)
-        return text.module({"int32": np.int32, "choose": choose}), width
+        return text.module({"int32": np.int32, "uint32": np.uint32, "choose": choose}), width
 
 
-class _Writer:
+class Writer:
     """Writes one law's loops."""
 
     def __init__(self, text: Text, law: Law) -> None:
@@ -174,7 +190,8 @@ class _Writer:
         self.own, self.other = law.fields
         self._names: dict[str, str] = {}
 
-    def _p(self) -> str:
+    def p(self) -> str:
+        """An expression for `p`, from the array `numbers`."""
         expressions, place = {}, 0
         for key, width in self.law._fields.items():
             expressions[key] = packed([f"numbers[{place + k}]" for k in range(width)])
@@ -201,6 +218,8 @@ class _Writer:
                 and isinstance(control, Setting)
                 and isinstance(control.value, int | float)
             }
+            if all(isinstance(c, Setting | Constant) for c in law.part.values.values()):
+                settings |= {k: (0.0,) for k in ("slope", "shift") if law.values(0.0).get(k) == 0.0}
             known = settings if settings and can_fold(function) else None
             self._names[name] = self.text.translation.add(function, law.owner, known)
         return self._names[name]
@@ -219,7 +238,7 @@ class _Writer:
         lines = (
             f"@kernel\ndef sweep_{what}(numbers, targets, sources, cluster, first, entry, itself, "
             "limit, listed, room, best, pick, out):\n"
-            f"    p = {self._p()}\n    quarter = F(0.25) * limit\n"
+            f"    p = {self.p()}\n    quarter = F(0.25) * limit\n"
         )
         lines += "".join(f"    t_{n} = targets[{i}]\n" for i, n in enumerate(own))
         lines += "".join(f"    s_{n} = sources[{i}]\n" for i, n in enumerate(other))
@@ -227,7 +246,7 @@ class _Writer:
         lines += "        slot = entry[first[c]:first[c + 1]]\n"
         for i, n in enumerate(other):
             lines += f"        q_{n} = room[{i}][:slot.size]\n"
-        lines += "        for q in range(slot.size):\n            k = slot[q]\n"
+        lines += "        for q in range(slot.size):\n            k = uint32(slot[q])\n"
         lines += "".join(f"            q_{n}[q] = s_{n}[k]\n" for n in other)
         lines += "        for i in range(cluster[c], cluster[c + 1]):\n"
         lines += "".join(f"            a_{n} = t_{n}[i]\n" for n in own)
@@ -265,7 +284,7 @@ class _Writer:
         """The loop from sums to accelerations."""
         names, law = self.own, self.law
         lines = "@kernel\ndef finish(numbers, targets, sums, order, push, lo, hi):\n"
-        lines += f"    p = {self._p()}\n"
+        lines += f"    p = {self.p()}\n"
         lines += "".join(f"    t_{n} = targets[{i}]\n" for i, n in enumerate(names))
         lines += "    for i in range(lo, hi):\n"
         lines += "".join(f"        a_{n} = t_{n}[i]\n" for n in names)

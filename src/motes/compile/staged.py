@@ -33,12 +33,13 @@ def write_staged(text: Text, motion: Motion) -> None:
     begin = f"    for i in range(x.size):\n        age, C = F(t - born[i]), {carried}\n"
     call = f"({row}, age, C, S, L, now)"
     pushed = f"        ax, ay, az, r, bx, by, bz = pushed{call}\n"
+    pushed += "".join(f"        a{a} += g{a}[i]\n" for a in AXES)
+    if motion.limits:
+        pushed += f"        ax, ay, az = limited{call[:-1]}, ax, ay, az)\n"
     flows = f"        ux, uy, uz = carried{call}\n" if motion.flows else ""
     if isinstance(motion.method, Splitting):
         change = "        g = phi1(r * h) * h\n" if motion.relaxes else "        g = h\n"
-        change += "".join(
-            f"        v{a}[i] += g * (a{a} + b{a} + g{a}[i] - r * v{a}[i])\n" for a in AXES
-        )
+        change += "".join(f"        v{a}[i] += g * (a{a} + b{a} - r * v{a}[i])\n" for a in AXES)
         head = "(Y, birth, columns, push, K, t, dt, lo, hi):\n    h = F(dt)\n"
         text.add(f"@kernel\ndef kick{head}{slices}{begin}{pushed}{change}")
         text.add(f"@kernel\ndef drift{head}{slices}{begin}{_drift(motion, flows, row)}")
@@ -46,7 +47,7 @@ def write_staged(text: Text, motion: Motion) -> None:
     outputs = "".join(f"    k{n} = slope_[{k}][lo:hi]\n" for k, n in enumerate(STATE))
     change = "".join(
         f"        k{a}[i] = v{a}[i]{f' + u{a}' if flows else ''}\n"
-        f"        kv{a}[i] = a{a} + b{a} + g{a}[i] - r * v{a}[i]\n"
+        f"        kv{a}[i] = a{a} + b{a} - r * v{a}[i]\n"
         for a in AXES
     )
     head = "@kernel\ndef slope(Y, birth, columns, push, slope_, K, t, lo, hi):\n"

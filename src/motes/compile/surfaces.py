@@ -69,8 +69,13 @@ class Surfaces:
         )
 
 
-def write_surfaces(text: Text, solids: Sequence[tuple[str, Component]]) -> Surfaces:
-    """Write `solids(S)` and `near(D, x, y, z)` into the text."""
+def write_surfaces(
+    text: Text, solids: Sequence[tuple[str, Component]], prefix: str = ""
+) -> Surfaces:
+    """Write `solids(S)`, `near(D, x, y, z)` and each `solid_k` into the text.
+
+    Another set of solids in one text needs a prefix for these names.
+    """
     lines = ""
     entries: list[str] = []
     starts: list[int] = []
@@ -86,16 +91,18 @@ def write_surfaces(text: Text, solids: Sequence[tuple[str, Component]]) -> Surfa
             lines += _rotation(k, pose["rotation"])
         matrix = [f"{name}{k}" for name in MATRIX] if turned else UNTURNED
         entries += [*pose["position"], *matrix, *pose["restitution"], *pose["friction"]]
-        distances.append(_distance(text, solid, address, k, starts[-1], entries, turned))
-    text.add(f"@inline\ndef solids(S):\n{lines}    return ({', '.join(entries)},)\n")
-    body = "    best, which = solid_0(D, x, y, z), 0\n"
+        distance = _distance(text, solid, address, k, starts[-1], entries, turned)
+        distances.append(f"@inline\ndef {prefix}{distance}")
+    text.add(f"@inline\ndef {prefix}solids(S):\n{lines}    return ({', '.join(entries)},)\n")
+    body = f"    best, which = {prefix}solid_0(D, x, y, z), 0\n"
     for k in range(1, len(solids)):
-        body += f"    d = solid_{k}(D, x, y, z)\n"
+        body += f"    d = {prefix}solid_{k}(D, x, y, z)\n"
         body += f"    which = {k} if d < best else which\n    best = min(best, d)\n"
     for source in distances:
         text.add(source)
-    text.add(f"@inline\ndef near(D, x, y, z):\n{body}    return best, which\n")
-    text.add(CARRIED)
+    text.add(f"@inline\ndef {prefix}near(D, x, y, z):\n{body}    return best, which\n")
+    if not prefix:
+        text.add(CARRIED)
     return Surfaces(tuple(solids), tuple(starts), len(entries))
 
 
@@ -138,4 +145,4 @@ def _distance(
         return packed([f"D[{first + i}]" for i in range(len(expressions))])
 
     call = text.call(solid, address, "distance", ", ".join(local), entry)
-    return f"@inline\ndef solid_{k}(D, x, y, z):\n{rows}    return {call.source}\n"
+    return f"solid_{k}(D, x, y, z):\n{rows}    return {call.source}\n"

@@ -11,6 +11,7 @@ since a piece adds nothing before it begins and its whole rise after it ends.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from motes.control.spline import Spline
 
 Array = NDArray[np.float64]
 
-MOST = 16
+MOST = 24
 """Pieces of a curve from which a lookup table is cheaper."""
 
 BOUND = 1e-4
@@ -70,7 +71,7 @@ def pieces(spline: Spline, low: float, high: float) -> Pieces | None:
     todo = list(_breaks(spline, low, high))
     if len(todo) - 1 > MOST:
         return None
-    parts = [(a, b) for a, b in zip(todo, todo[1:], strict=False)]
+    parts = list(pairwise(todo))
     scale = max(float(np.ptp(_sampled(spline, np.linspace(low, high, 65)))), 1e-30)
     done: list[tuple[float, float, Array]] = []
     while parts:

@@ -60,4 +60,38 @@ def names(value: Any, name: str) -> list[str]:
     return value
 
 
-TABLES: dict[str, Callable[[Any, str], Any]] = {"bursts": bursts, "names": names}
+def species(value: Any, name: str) -> dict[str, dict[str, float]]:
+    """Values of systems by name: { argon = { epsilon = 1.0 }, ... }; also an empty list.
+
+    Raises ValueError with one line.
+    """
+    if isinstance(value, list) and not value:
+        return {}
+    if not isinstance(value, dict):
+        raise ValueError(f"{name} must be {{ argon = {{ epsilon = 1.0, sigma = 1.0 }}, ... }}.")
+    for system, own in value.items():
+        with within(system):
+            if not isinstance(own, dict):
+                raise ValueError(f"{name}.{system} must be a table, such as {{ epsilon = 1.0 }}.")
+            for key, number in own.items():
+                plain = isinstance(number, int | float) and not isinstance(number, bool)
+                if key not in SPECIES:
+                    raise ValueError(
+                        f'{name}.{system} has no "{key}".{likely(str(key), SPECIES)} '
+                        f"It takes {', '.join(SPECIES)}."
+                    )
+                if not plain or (key != "charge" and number < 0) or abs(number) > 1e30:
+                    raise ValueError(
+                        f"{name}.{system}.{key} = {number} must be a number, not below 0."
+                    )
+    return {system: {k: float(v) for k, v in own.items()} for system, own in value.items()}
+
+
+SPECIES = ("epsilon", "sigma", "charge")
+"""What a system may have of its own in a pair law."""
+
+TABLES: dict[str, Callable[[Any, str], Any]] = {
+    "bursts": bursts,
+    "names": names,
+    "species": species,
+}

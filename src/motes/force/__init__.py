@@ -4,11 +4,15 @@ A force defines `acceleration(p, q, t)`, which gives ax, ay, az in m/s2, and `po
 in J/kg where one exists; or, for forces that pull the velocity to a value, `relaxation(p, q, t)`,
 which gives the rate k [1/s] and that velocity u [m/s]: a = -k (v - u). Splitting methods integrate
 a relaxation exactly, so that no step makes it explode; Runge-Kutta methods use it as a force.
+
+A limit defines `limited(p, q, t, ax, ay, az)`: what the body can do of the sum of all
+accelerations, those of laws between particles too. A force that needs "obstacle" reads the solids
+of the scene: `q.obstacle` is the gap to the nearest one [m] and its normal, (gap, nx, ny, nz).
 """
 
 from __future__ import annotations
 
 from motes.catalog import Kind, attribute
 
-KIND = Kind("force", "force", "particle", ("acceleration", "relaxation"))
+KIND = Kind("force", "force", "particle", ("acceleration", "relaxation", "limited"))
 __getattr__ = attribute("force")

@@ -10,7 +10,13 @@ r.square, r.length.
 
 A law without a reach, such as gravity, defines `accelerations(p, bodies)`: from the positions and
 masses of all systems that take part, an array (3, n) [m/s2] for each of them; it may define
-`energy(p, bodies)`, their potential energy [J].
+`energy(p, bodies)`, their potential energy [J]. What happens at the end of a step, such as a
+collision or a thermostat, defines `exchange(p, movers, when)`, which changes velocities, and
+returns whether it moved anybody.
+
+A law of velocities defines `velocities(p, walkers, step)`: what the particles may do of what the
+forces want (`constrain.py`). A law of captures defines `captures(p, hunters, prey)`: which
+particles are caught at a step's end (`capture.py`).
 
 Systems that share an interaction are one group and take every stage of a step together.
 """
@@ -29,7 +35,8 @@ class _Common:
 
 class _Near(_Common):
     sources: Any = quantity((), table="names")
-    """Systems whose particles are felt by all that take part; all of them when none is named."""
+    """Systems whose particles are felt, also such as `systems` does not name; when none is named,
+    those that take part feel each other."""
 
     skin: Number = quantity(0.1, "", at_least=0, at_most=1, scope="scene")
     """Margin of neighbour lists as a share of the reach: wider lists are longer and last longer."""
@@ -48,7 +55,7 @@ KIND = Kind(
     "interact",
     "interaction",
     "scene",
-    ("accelerations", "force", "near"),
+    ("accelerations", "force", "near", "exchange", "velocities", "captures"),
     _Common,
     {"force": _Near, "near": _Gathering},
 )

@@ -17,12 +17,18 @@ from numpy.typing import NDArray
 from motes.interact.cells import Cells, Grid, grid, sort
 from motes.jit import STRICT, blocks, jit, share
 
+FINER = 1.6
+"""Cells per reach: finer ones make compact clusters, but there are more of them to look into."""
+
 CLUSTER = 8
 """Most particles of a cluster."""
 
 SMALLEST_PART = 1 << 11
 LARGEST_PART = 1 << 14
 """Particles of one task."""
+
+ROWS = 1 << 14
+"""Slots of one task of a loop that is quick."""
 
 
 class Box(NamedTuple):
@@ -54,6 +60,8 @@ class Arranged(NamedTuple):
     """(g,) slots of the particles that ghosts are images of."""
     shift: NDArray[Any]
     """(3, g) from a particle to its image [m]."""
+    inner: NDArray[np.float64]
+    """(2, 3) the box's lowest and highest coordinates; ghosts are outside [m]."""
     clusters: list[NDArray[np.int32]]
     """For each part of the slots, where its clusters begin and, last, where it ends."""
 
@@ -75,20 +83,20 @@ def wrap(x: Any, low: Any, size: Any) -> None:
 
 def wrapped(position: NDArray[Any], periodic: Box) -> None:
     """Take positions (3, n) [m] into the box, in place."""
-    real = position.dtype.type
-    for axis in np.flatnonzero(periodic.size):
-        wrap(position[axis], real(periodic.low[axis]), real(periodic.size[axis]))
+    real, axes = position.dtype.type, np.flatnonzero(periodic.size)
+    low, size = periodic.low.astype(real), periodic.size.astype(real)
+    share(lambda k: wrap(position[axes[k]], low[axes[k]], size[axes[k]]), len(axes))
 
 
 def common_grid(positions: list[NDArray[Any]], reach: float, periodic: Box) -> Grid:
-    """Cells for particles (3, n) within the box and their ghosts, half as wide as the reach."""
+    """Cells for particles (3, n) within the box and their ghosts, narrower than the reach."""
     inside = [p for p in positions if p.shape[1]]
     low = np.min([p.min(axis=1) for p in inside], axis=0) if inside else np.zeros(3)
     high = np.max([p.max(axis=1) for p in inside], axis=0) if inside else np.zeros(3)
     low = np.where(periodic.size > 0, periodic.low - reach, low)
     high = np.where(periodic.size > 0, periodic.low + periodic.size + reach, high)
     real = positions[0].dtype if positions else np.float64
-    return grid(np.stack([low, high]).astype(float), reach / 2, np.full(3, np.inf, real))
+    return grid(np.stack([low, high]).astype(float), reach / FINER, np.full(3, np.inf, real))
 
 
 def arrange(position: NDArray[Any], cut: Grid, reach: float, periodic: Box) -> Arranged:
@@ -109,7 +117,10 @@ def arrange(position: NDArray[Any], cut: Grid, reach: float, periodic: Box) -> A
     ghosts = sort(real.position[:, slots] + shift, cut)
     clusters = _clusters(real, cut, reach)
     ghost_of = slots[ghosts.row]
-    return Arranged(real.row, real, ghosts, ghost_of, shift[:, ghosts.row], clusters)
+    edges = np.where(
+        periodic.size > 0, [periodic.low, periodic.low + periodic.size], [[-np.inf], [np.inf]]
+    )
+    return Arranged(real.row, real, ghosts, ghost_of, shift[:, ghosts.row], edges, clusters)
 
 
 def part_size(n: int) -> int:
@@ -156,26 +167,27 @@ class Packing(NamedTuple):
         Returns the square of the longest way that one has gone [m2]. The last slot is a place far
         from everything, to fill lists up with.
         """
-        real = position.dtype.type
-        order, then = self.arranged.order, self.arranged.real.position
-        n = order.size
-        size = self.periodic.size.astype(real)
-        parts = blocks(n, max(part_size(n), 1 << 13))
+        arranged = self.arranged
+        size = self.periodic.size.astype(out.dtype)
+        parts = blocks(arranged.slots, ROWS)
         moved = np.zeros(len(parts) + 1)
 
         def pack(k: int) -> None:
-            rows = slice(*parts[k])
-            moved[k] = _pack(position, order[rows], then[:, rows], size, out[:, rows])
+            moved[k] = _pack(
+                position, arranged.order, arranged.ghost_of, arranged.real.position,
+                arranged.shift, size, out, *parts[k],
+            )  # fmt: skip
 
         share(pack, len(parts))
-        if self.arranged.ghost_of.size:
-            _images(self.arranged.ghost_of, self.arranged.shift, out, n)
         out[:, -1] = FAR
         return float(moved.max())
 
     def values(self, values: NDArray[Any], out: NDArray[Any]) -> None:
         """Fill (slots + 1,) from values (rows,)."""
-        _take(values, self.arranged.order, self.arranged.ghost_of, out)
+        parts = blocks(self.arranged.slots, ROWS)
+        order, ghost_of = self.arranged.order, self.arranged.ghost_of
+        share(lambda k: _take(values, order, ghost_of, out, *parts[k]), len(parts))
+        out[-1] = out[0]
 
 
 FAR = 1e15
@@ -183,17 +195,23 @@ FAR = 1e15
 
 
 @jit
-def _pack(position: Any, order: Any, then: Any, size: Any, out: Any) -> Any:
-    most = position.dtype.type(0)
-    for i in range(order.size):
-        away2 = position.dtype.type(0)
+def _pack(
+    position: Any, order: Any, ghost_of: Any, then: Any, shift: Any, size: Any, out: Any,
+    begin: Any, end: Any,
+) -> Any:  # fmt: skip
+    most = out.dtype.type(0)
+    n = order.size
+    for i in range(begin, end):
+        slot = np.uint64(i if i < n else ghost_of[i - n])
+        row = np.uint64(order[slot])
+        away2 = out.dtype.type(0)
         for axis in range(3):
-            x, old = position[axis, order[i]], then[axis, i]
+            x, old = position[axis, row], then[axis, slot]
             away, period = x - old, size[axis]
             if period > 0 and abs(away) > period / 2:
                 turns = period * np.round(away / period)
                 x, away = x - turns, away - turns
-            out[axis, i] = x
+            out[axis, i] = x if i < n else x + shift[axis, i - n]
             away2 += away * away
         if not away2 <= most:
             most = away2  # Not a number counts as far.
@@ -201,16 +219,8 @@ def _pack(position: Any, order: Any, then: Any, size: Any, out: Any) -> Any:
 
 
 @jit
-def _images(ghost_of: Any, shift: Any, out: Any, begin: Any) -> None:
-    for axis in range(3):
-        for i in range(ghost_of.size):
-            out[axis, begin + i] = out[axis, ghost_of[i]] + shift[axis, i]
-
-
-@jit
-def _take(values: Any, order: Any, ghost_of: Any, out: Any) -> None:
-    for i in range(order.size):
-        out[i] = values[order[i]]
-    for i in range(ghost_of.size):
-        out[order.size + i] = out[ghost_of[i]]
-    out[order.size + ghost_of.size] = out[0] if order.size else out.dtype.type(0)
+def _take(values: Any, order: Any, ghost_of: Any, out: Any, begin: Any, end: Any) -> None:
+    n = order.size
+    for i in range(begin, end):
+        slot = np.uint64(i if i < n else ghost_of[i - n])
+        out[i] = values[np.uint64(order[slot])]

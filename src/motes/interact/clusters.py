@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.interact.arrange import Arranged
-from motes.interact.cells import Grid, first_from
+from motes.interact.cells import Grid
 from motes.jit import STRICT, jit, share
 from motes.memory import allocate
 
@@ -30,6 +30,8 @@ class Part(NamedTuple):
     """(k + 1,) where their lists begin in `entry` and, last, end."""
     entry: NDArray[np.int32]
     """Slots of neighbours; the slot after the last stands for nobody."""
+    longest: int
+    """Length of the longest list."""
 
 
 class _Room(NamedTuple):
@@ -37,11 +39,13 @@ class _Room(NamedTuple):
 
     position: NDArray[Any]
     slot: NDArray[np.int32]
-    least: NDArray[Any]
+    hit: NDArray[np.int32]
 
 
 def _room(points: int, real: Any) -> _Room:
-    return _Room(np.empty((3, points), real), np.empty(points, np.int32), np.empty(points, real))
+    return _Room(
+        np.empty((3, points), real), np.empty(points, np.int32), np.empty(points, np.int32)
+    )
 
 
 @jit(inline=True, flags=STRICT)
@@ -56,31 +60,68 @@ def _span(low: Any, high: Any, origin: Any, scale: Any, count: Any, wraps: Any) 
 
 
 @jit(inline=True, flags=STRICT)
-def _collect(low: Any, high: Any, cells: Any, grid: Any, begin: Any, points: Any, room: Any) -> Any:
-    """Append the points of all cells that meet a box to the room, as far as it goes."""
-    if cells.key.size == 0:
+def _between(low: Any, high: Any, left: Any, wide: Any, wraps: Any, slack: Any) -> Any:
+    """Square of the distance along an axis between a box and a cell, at most."""
+    if wraps:
+        return np.float64(0)
+    apart = max(left - high, low - (left + wide)) - slack
+    return max(apart, np.float64(0)) ** 2
+
+
+@jit(inline=True)
+def _from(number: Any, table: Any, keys: Any, shift: Any) -> Any:
+    """The first point whose cell's number is not below a number."""
+    entry = np.uint64(number) >> shift
+    if entry >= np.uint64(table.size - 1):
+        return np.int64(keys.size)
+    low = np.int64(table[entry])
+    if shift > np.uint64(0):
+        high = np.int64(table[entry + np.uint64(1)])
+        while low < high:
+            middle = (low + high) >> 1
+            if keys[np.uint64(middle)] < np.uint64(number):
+                low = middle + 1
+            else:
+                high = middle
+    return low
+
+
+@jit(flags=STRICT)
+def _collect(
+    low: Any, high: Any, wide: Any, grid: Any, xs: Any, ys: Any, zs: Any, keys: Any, table: Any,
+    shift: Any, begin: Any, points: Any, rx: Any, ry: Any, rz: Any, slot: Any,
+) -> Any:  # fmt: skip
+    """Append the points of all cells within `wide` of a box to the room, as far as it goes."""
+    if keys.size == 0:
         return points
     nx, ny, nz = grid.shape[0], grid.shape[1], grid.shape[2]
-    x, nx_around = _span(low[0], high[0], grid.low[0], grid.scale[0], nx, grid.wraps[0])
-    y, ny_around = _span(low[1], high[1], grid.low[1], grid.scale[1], ny, grid.wraps[1])
-    z, nz_around = _span(low[2], high[2], grid.low[2], grid.scale[2], nz, grid.wraps[2])
-    for k in range(nz_around):
-        for j in range(ny_around):
-            row = ((z + k) % nz * ny + (y + j) % ny) * nx
+    x0, y0, z0 = grid.low[0], grid.low[1], grid.low[2]
+    sx, sy, sz = grid.scale[0], grid.scale[1], grid.scale[2]
+    wraps_x, wraps_y, wraps_z = grid.wraps[0], grid.wraps[1], grid.wraps[2]
+    slack, cy, cz = 1e-6 * wide, 1 / sy, 1 / sz
+    y, ny_around = _span(low[1] - wide, high[1] + wide, y0, sy, ny, wraps_y)
+    z, nz_around = _span(low[2] - wide, high[2] + wide, z0, sz, nz, wraps_z)
+    for k in range(z, z + nz_around):
+        dz2 = _between(low[2], high[2], z0 + k * cz, cz, wraps_z, slack)
+        layer = (k - nz if k >= nz else k) * ny
+        for j in range(y, y + ny_around):
+            left2 = wide * wide - dz2 - _between(low[1], high[1], y0 + j * cy, cy, wraps_y, slack)
+            if left2 < 0:
+                continue
+            half = np.sqrt(left2) + slack
+            x, nx_around = _span(low[0] - half, high[0] + half, x0, sx, nx, wraps_x)
+            row = (layer + (j - ny if j >= ny else j)) * nx
             start, left = x, nx_around
             while left > 0:
                 length = min(left, nx - start)
-                first = first_from(np.uint64(row + start), cells)
-                last = first_from(np.uint64(row + start + length), cells)
-                if points + last - first <= room.slot.size:
-                    for axis in range(3):
-                        old = cells.position[axis, first:last]
-                        new = room.position[axis, points : points + last - first]
-                        for q in range(old.size):
-                            new[q] = old[q]
-                    slot = room.slot[points : points + last - first]
-                    for q in range(slot.size):
-                        slot[q] = np.int32(begin + first + q)
+                first = _from(row + start, table, keys, shift)
+                last = _from(row + start + length, table, keys, shift)
+                if points + last - first <= slot.size:
+                    p = np.uint64(points)
+                    for q in range(np.uint64(first), np.uint64(last)):
+                        rx[p], ry[p], rz[p] = xs[q], ys[q], zs[q]
+                        slot[p] = np.int32(begin) + np.int32(q)
+                        p += np.uint64(1)
                 points += last - first
                 start, left = np.int64(0), left - length
     return points
@@ -93,6 +134,7 @@ def _seek(
     cells: Any,
     ghosts: Any,
     grid: Any,
+    inner: Any,
     radius: Any,
     begin: Any,
     room: Any,
@@ -105,38 +147,51 @@ def _seek(
     wide = radius * (1 + 2.0**-18)
     n = cells.key.size
     nobody = np.int32(n + ghosts.key.size)
+    xs, ys, zs = position[0], position[1], position[2]
+    cx, cy, cz = cells.position[0], cells.position[1], cells.position[2]
+    gx, gy, gz = ghosts.position[0], ghosts.position[1], ghosts.position[2]
+    cell_key, cell_table, cell_shift = cells.key, cells.first, cells.shift
+    ghost_key, ghost_table, ghost_shift = ghosts.key, ghosts.first, ghosts.shift
+    rx, ry, rz = room.position[0], room.position[1], room.position[2]
+    slot, hits = room.slot, room.hit
     for c in range(begin, cluster.size - 1):
         a, b = cluster[c], cluster[c + 1]
-        low = (position[0, a], position[1, a], position[2, a])
+        low = (np.float64(xs[a]), np.float64(ys[a]), np.float64(zs[a]))
         high = low
         for i in range(a + 1, b):
-            x, y, z = position[0, i], position[1, i], position[2, i]
+            x, y, z = np.float64(xs[i]), np.float64(ys[i]), np.float64(zs[i])
             low = (min(low[0], x), min(low[1], y), min(low[2], z))
             high = (max(high[0], x), max(high[1], y), max(high[2], z))
-        least = (np.float64(low[0]) - wide, np.float64(low[1]) - wide, np.float64(low[2]) - wide)
-        most = (np.float64(high[0]) + wide, np.float64(high[1]) + wide, np.float64(high[2]) + wide)
-        points = _collect(least, most, cells, grid, np.int64(0), np.int64(0), room)
-        points = _collect(least, most, ghosts, grid, n, points, room)
+        points = _collect(
+            low, high, wide, grid, cx, cy, cz, cell_key, cell_table, cell_shift, np.int64(0),
+            np.int64(0), rx, ry, rz, slot,
+        )  # fmt: skip
+        alone = True
+        for axis in range(3):
+            alone &= (low[axis] - wide > inner[0, axis]) & (high[axis] + wide < inner[1, axis])
+        if not alone:
+            points = _collect(
+                low, high, wide, grid, gx, gy, gz, ghost_key, ghost_table, ghost_shift, n,
+                points, rx, ry, rz, slot,
+            )  # fmt: skip
         total = first[c]
-        if points > room.slot.size or total + points + WIDTH > entry.size:
+        if points > slot.size or total + points + WIDTH > entry.size:
             return c, points
-        near2 = room.least[:points]
-        near2[:] = real(np.inf)
-        xs, ys, zs = room.position[0][:points], room.position[1][:points], room.position[2][:points]
+        hit = hits[:points]
+        hit[:] = np.int32(0)
         for i in range(a, b):
-            x, y, z = position[0, i], position[1, i], position[2, i]
-            for q in range(near2.size):
-                dx, dy, dz = x - xs[q], y - ys[q], z - zs[q]
-                near2[q] = min(near2[q], dx * dx + dy * dy + dz * dz)
-        slot, kept = room.slot[:points], entry[total:]
-        new = np.uint64(0)
-        for q in range(slot.size):
-            kept[new] = slot[q]
-            new += np.uint64(near2[q] <= limit)
-        while new % np.uint64(WIDTH):
-            kept[new] = nobody
+            x, y, z = xs[i], ys[i], zs[i]
+            for q in range(hit.size):
+                dx, dy, dz = x - rx[q], y - ry[q], z - rz[q]
+                hit[q] |= np.int32(dx * dx + dy * dy + dz * dz <= limit)
+        new = np.uint64(total)
+        for q in range(hit.size):
+            entry[new] = slot[q]
+            new += np.uint64(hit[q])
+        while (new - np.uint64(total)) % np.uint64(WIDTH):
+            entry[new] = nobody
             new += np.uint64(1)
-        first[c + 1] = total + np.int64(new)
+        first[c + 1] = np.int64(new)
     return cluster.size - 1, np.int64(0)
 
 
@@ -163,7 +218,7 @@ def lists(
         room, begin = _room(1024, real), 0
         while begin < cluster.size - 1:
             begin, points = _seek(
-                position, cluster, sources.real, sources.ghosts, cut, float(radius),
+                position, cluster, sources.real, sources.ghosts, cut, sources.inner, float(radius),
                 begin, room, first, entry,
             )  # fmt: skip
             if points > room.slot.size:
@@ -174,7 +229,7 @@ def lists(
                 larger = allocate((size,), np.int32, "a list of neighbours")
                 larger[: first[begin]] = entry[: first[begin]]
                 entry = larger
-        parts[k] = Part(cluster, first, entry)
+        parts[k] = Part(cluster, first, entry, int(np.diff(first).max(initial=1)))
 
     share(seek, len(parts))
     return parts

@@ -1,4 +1,9 @@
-"""How a system is drawn: as points, streaks or soft sprites."""
+"""How a system is drawn: as points, streaks or soft sprites, or as figures.
+
+A look says `drawn_as`, one of points, streaks and sprites. One that defines
+`figure(p, phase, pace)` puts a body together from dots (`figure.py`), which stands upright or turns
+with its way (`upright`).
+"""
 
 from __future__ import annotations
 

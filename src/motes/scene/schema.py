@@ -10,7 +10,7 @@ from motes.catalog import KINDS, Component, catalog, kinds
 from motes.catalog.parameter import SCOPES, Parameter
 from motes.control.curve import SCOPE_OF
 from motes.control.parse import EXTRAPOLATIONS, INTERPOLATIONS
-from motes.control.tables import MOST
+from motes.control.tables import MOST, SPECIES
 from motes.scene.document import Scene, System
 from motes.scene.names import WORD
 from motes.scene.section import Section
@@ -203,6 +203,10 @@ _TABLES: dict[str, Schema] = {
             {key: {"type": "number", "minimum": 0, "maximum": most} for key, most in MOST.items()},
             ("count",),
         ),
+    },
+    "species": {
+        "type": "object",
+        "additionalProperties": _table({key: {"type": "number"} for key in SPECIES}, ()),
     },
     "names": {
         "type": "array",

@@ -1,0 +1,48 @@
+"""Flying as the others fly."""
+
+from typing import Any
+
+import numpy as np
+
+from motes.catalog import Number, component, quantity
+from motes.kernel import kernel, sqrt
+
+
+@component
+class Alignment:
+    """Towards the mean velocity of those in sight: a = rate sum w (v_b - v_a) / (sum w + 0.05).
+
+    w = 1 - d / radius, in a cone of vision around the way one flies. The second rule of Reynolds,
+    Flocks, herds, and schools (SIGGRAPH 1987); cones as in his OpenSteer.
+    """
+
+    rate: Number = quantity(2.0, "1/s", at_least=0)
+    """How fast velocities become alike."""
+
+    radius: Number = quantity(4.0, "m", above=0)
+    """How far one sees."""
+
+    angle: Number = quantity(135.0, "degrees", above=0, at_most=180)
+    """Half the opening of the cone of vision; at 180 one sees all around."""
+
+    def reach(p: Any) -> float:
+        """Support radius [m]."""
+        return float(p.radius)
+
+    def constants(p: Any) -> dict[str, float]:
+        """`edge`: cosine of the cone's half angle, below -1 where it is open; 1 / radius."""
+        edge = -2.0 if p.angle >= 180 else float(np.cos(np.radians(p.angle)))
+        return {"edge": edge, "per_radius": 1.0 / p.radius}
+
+    @kernel
+    def near(p, a, b, r):
+        v = sqrt(a.vx * a.vx + a.vy * a.vy + a.vz * a.vz)
+        ahead = -(a.vx * r.x + a.vy * r.y + a.vz * r.z)
+        seen = 1.0 if ahead >= p.edge * v * r.length else 0.0
+        w = seen * (1.0 - r.length * p.per_radius)
+        return w * (b.vx - a.vx), w * (b.vy - a.vy), w * (b.vz - a.vz), w
+
+    @kernel
+    def acceleration(p, a, s):
+        k = p.rate / (s[3] + 0.05)
+        return k * s[0], k * s[1], k * s[2]
