@@ -20,6 +20,7 @@ from _report import Report, arguments, best, machine
 
 import motes
 from motes.jit import blocks, jit, share
+from motes.memory import allocate
 
 STEP = 1e-3
 RATE, CORE, STRENGTH = 0.1, 0.1, 2.0
@@ -80,7 +81,7 @@ def _bare(block, c, low, high):  # type: ignore[no-untyped-def]
 
 def bare(n: int, repeats: int) -> float:
     """Millions of rows of six columns per second: each is read, added to, written."""
-    block, parts = np.zeros((6, n), np.float32), blocks(n, 1 << 17)
+    block, parts = allocate((6, n), np.float32, "the yardstick"), blocks(n, 1 << 17)
 
     def update() -> None:
         share(lambda k: _bare(block, np.float32(1e-9), *parts[k]), len(parts))

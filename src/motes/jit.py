@@ -28,6 +28,7 @@ import numpy as np
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.registry import CPUDispatcher
+from numba.extending import _Intrinsic
 
 from motes.errors import OutputError
 from motes.files import written_whole
@@ -313,6 +314,8 @@ def _describe(value: Any, names: tuple[str, ...], seen: frozenset[int]) -> str:
         return _fingerprint(value.py_func, seen) + repr(flags)
     if isinstance(value, types.FunctionType):
         return _fingerprint(value, seen)
+    if isinstance(value, _Intrinsic):
+        return _fingerprint(value._defn, seen)
     if isinstance(value, np.ndarray):
         return hashlib.sha256(value.tobytes()).hexdigest() + str(value.dtype)
     if isinstance(value, types.ModuleType):

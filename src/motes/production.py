@@ -115,10 +115,11 @@ def redraw(
         OutputError: there are no frames, or one is damaged.
         SceneError: a value does not fit, or `first` and `last` name no kept frame.
     """
-    from motes.scene import from_document
+    from motes.scene import drawable, from_document
 
     store = open_frames(folder)
-    scene = from_document(store.manifest.scene, source=str(store.folder / "manifest.json"))
+    document = drawable(store.manifest.scene)
+    scene = from_document(document, source=str(store.folder / "manifest.json"))
     scene = scene.with_values(values or {})
     numbers = _numbers(first, last, store.numbers())
     report = Report(watch)
@@ -156,7 +157,7 @@ def _manifest(scene: Scene, name: str) -> Manifest:
     document = scene.document()
     release = version("motes")
     owners = (scene, *scene.systems)
-    lists = ("emit", "force", "flow", "solid", "retire")
+    lists = ("emit", "force", "flow", "interact", "solid", "retire")
     parts = [part for owner in owners for name in lists for part in getattr(owner, name, ())]
     sources = {f"{part.kind.name}/{part.type}": part.source() for part in parts}
     digest = digest_of(release, document, sources)

@@ -15,7 +15,17 @@ from rich_scene import RICH
 
 import motes
 from motes.errors import SceneError
-from motes.scene import Scene, System, from_document, gallery, gallery_text, load, loads, schema
+from motes.scene import (
+    Scene,
+    System,
+    drawable,
+    from_document,
+    gallery,
+    gallery_text,
+    load,
+    loads,
+    schema,
+)
 from motes.scene.address import component_address, places
 from motes.scene.sections import Camera, Film, Sky
 
@@ -173,8 +183,20 @@ def test_an_unclear_address_is_one_line_with_candidates(address: str, line: str)
 def test_a_value_that_does_not_fit_an_address_is_one_line() -> None:
     assert lines_of(sparks().with_values, {"rate": -1, "seed": "x"}) == [
         'seed must be a whole number, not "x".',
-        'emitter "cone": rate = -1 1/s must be at least 0 1/s.',
+        "rate: rate = -1 1/s must be at least 0 1/s.",
     ]
+
+
+def test_frames_of_a_scripts_component_are_drawn_without_it() -> None:
+    """What moved particles is not needed once they have moved; what is drawn is."""
+    document = sparks().document()
+    known = document["system"][0]["emit"]
+    foreign = [*known, {"type": "of_a_script", "strength": 3}]
+    changed = {**document, "system": [{**document["system"][0], "emit": foreign}]}
+    assert drawable(changed)["system"][0]["emit"] == known
+    assert from_document(drawable(changed)) == sparks()
+    solid = {**document, "solid": [{"type": "of_a_script"}]}
+    assert drawable(solid)["solid"] == solid["solid"]
 
 
 def test_addresses_of_components() -> None:

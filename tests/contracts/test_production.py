@@ -71,7 +71,7 @@ def simulation(monkeypatch: pytest.MonkeyPatch) -> type[Simulation]:
     parts = {
         "motes.simulation": {"Simulation": type("Jet", (Simulation,), {})},
         "motes.studio": {"Studio": Studio},
-        "motes.scene": {"from_document": lambda document, source: SCENE},
+        "motes.scene": {"from_document": lambda document, source: SCENE, "drawable": dict},
     }
     for name, content in parts.items():
         module = ModuleType(name)

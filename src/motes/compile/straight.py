@@ -28,8 +28,10 @@ def write_straight(text: Text, motion: Motion, surfaces: Surfaces | None) -> Non
 
 HEAD = "(position, velocity, birth, columns, flags, K, t, end, lo, hi):\n"
 
-CHUNK = 2048
-"""Rows whose ages are found at once: a double in the main loop would halve its SIMD width."""
+CHUNK = 1024
+"""Rows that are prepared at once. Their ages are found before the main loop, whose SIMD width a
+double would halve. Their old state is put aside where rows may be left as they were: to store only
+some rows of a SIMD register is slow."""
 
 DEAD, THREATENED = 1, 2
 """What a row's flag says."""
@@ -82,15 +84,13 @@ def _write_step(
     if surfaces is not None:
         prelude += "    D0, D1 = solids(scene(K, t)), solids(scene(K, end))\n"
         body += f"            meets = threatened(D0, D1, {loop.row}, {ends}, h)\n"
-        body += "".join(f"            {n}[i] = {n}[i] if meets else n{n}\n" for n in loop.state)
-        marks.append(f"(uint8({THREATENED}) if meets else uint8(0))")
-    else:
-        body += "".join(f"            {n}[i] = n{n}\n" for n in loop.state)
+        marks.append(f"uint8({THREATENED}) * uint8(meets)")
+    body += "".join(f"            {n}[i] = n{n}\n" for n in loop.state)
     if motion.mortal:
         body += f"            gone = dies({ends}, old[i], C, {after}, L, now)\n"
-        marks.append(f"(uint8({DEAD}) if gone else uint8(0))")
+        marks.append(f"uint8({DEAD}) * uint8(gone)")
     if marks:
-        body += f"            flag[i] = {' | '.join(marks)}\n"
+        body += f"            flag[i] = uint8({' | '.join(marks)})\n"
     found = ""
     for name, time, wanted in (("ages", "t", aged), ("old", "end", outlived)):
         if wanted:
@@ -99,12 +99,30 @@ def _write_step(
             found += (
                 f"        for i in range(born.size):\n            {name}[i] = F({time} - born[i])\n"
             )
+    undo = ""
+    if surfaces is not None:
+        for n in loop.state:
+            prelude += f"    room_of_{n} = empty({CHUNK}, F)\n"
+            found += f"        old_{n} = room_of_{n}[: high - low]\n"
+        copies, back = (
+            "".join(f"{indent}{to}[i] = {of}[i]\n" for to, of in pairs)
+            for indent, pairs in (
+                (" " * 12, [(f"old_{n}", n) for n in loop.state]),
+                (" " * 20, [(n, f"old_{n}") for n in loop.state]),
+            )
+        )
+        found += f"        for i in range(x.size):\n{copies}"
+        undo = (
+            "        seen = 0\n        for i in range(flag.size):\n            seen |= flag[i]\n"
+            f"        if seen & {THREATENED}:\n            for i in range(flag.size):\n"
+            f"                if flag[i] & {THREATENED}:\n{back}"
+        )
     text.add(
         f"@kernel\ndef {'young' if young else 'straight'}{HEAD}{prelude}"
         f"    for low in range(lo, hi, {CHUNK}):\n"
         f"        high = min(low + {CHUNK}, hi)\n"
         f"{loop.slices('low', 'high', ' ' * 8)}        flag = flags[low:high]\n"
-        f"{found}        for i in range(x.size):\n{body}"
+        f"{found}        for i in range(x.size):\n{body}{undo}"
     )
 
 

@@ -45,13 +45,12 @@ def _shake(
 @jit(flags=EXACT)
 def collide(
     first: Any, row: Any, x: Any, v: Any, m: Any, size: Any, period: Any, restitution: Any,
-    friction: Any, rounds: Any, hit: Any,
+    friction: Any, slow: Any, rounds: Any,
 ) -> Any:  # fmt: skip
     """Impulses between spheres that overlap and approach, one pair after another, in order.
 
-    `hit` remembers which pairs have bounced: later rounds only stop what still approaches. Returns
-    the number of collisions. Positions are moved apart, heavier ones less, until none overlap or
-    the rounds are over.
+    Those that approach slower than `slow` only stop. Positions are moved apart, heavier ones less,
+    until none overlap or the rounds are over. Returns how often any did.
     """
     count = 0
     for _ in range(rounds):
@@ -73,9 +72,7 @@ def collide(
                 ux, uy, uz = v[0, i] - v[0, j], v[1, i] - v[1, j], v[2, i] - v[2, j]
                 un = ux * nx + uy * ny + uz * nz
                 if un < 0:
-                    bounce = restitution if hit[e] == 0 else 0.0
-                    count += hit[e] == 0
-                    hit[e] = 1
+                    bounce = restitution if un < -slow else 0.0
                     push = -(1 + bounce) * un / (wi + wj)
                     tx, ty, tz = ux - un * nx, uy - un * ny, uz - un * nz
                     ut = np.sqrt(tx * tx + ty * ty + tz * tz)
@@ -88,6 +85,7 @@ def collide(
                     v[1, j] -= wj * jy
                     v[2, j] -= wj * jz
                     quiet = quiet and un > -1e-12
+                count += 1
                 apart = (reach - far) / (wi + wj)
                 x[0, i] += wi * apart * nx
                 x[1, i] += wi * apart * ny

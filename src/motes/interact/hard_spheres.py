@@ -29,11 +29,14 @@ class HardSpheres:
     friction: Number = quantity(0.3, "", at_least=0)
     """Coefficient of friction between spheres."""
 
+    rest_speed: Number = quantity(0.02, "m/s", at_least=0)
+    """Speed of approach below which spheres do not bounce, so that piles come to rest."""
+
     rounds: Integer = quantity(12, at_least=1, at_most=1000)
     """Most rounds of collisions in a step; piles need more of them."""
 
     def exchange(p: Any, movers: Sequence[Movers], when: Occasion) -> bool:
-        """Let all that overlap collide; returns whether any did."""
+        """Let all that overlap collide; returns whether any were moved."""
         from motes.interact.exchanges import collide
         from motes.interact.search import Who
         from motes.neighbours import _around
@@ -49,10 +52,10 @@ class HardSpheres:
         low, box = when.periodic.low, when.periodic.size
         period = np.where(box > 0, box, np.inf)
         found = _around((x - low[:, None]).T, None, float(size.max()), period, Who.LATER)
-        hit = np.zeros(found.first[-1], np.uint8)
         far = np.where(box > 0, box, 1e300)
-        law = p.restitution, p.friction, p.rounds
-        collide(found.first, found.row, x, v, m, size, far, *law, hit)
+        law = p.restitution, p.friction, p.rest_speed, p.rounds
+        if not collide(found.first, found.row, x, v, m, size, far, *law):
+            return False
         back = np.empty_like(order)
         back[order] = np.arange(order.size)
         begin = 0

@@ -1,6 +1,6 @@
 """The document: read, checked, addressed, written."""
 
-from motes.scene.document import Scene, System, from_document
+from motes.scene.document import Scene, System, drawable, from_document
 from motes.scene.gallery import gallery, gallery_text
 from motes.scene.read import load, loads
 from motes.scene.schema import schema
@@ -13,6 +13,7 @@ __all__ = [
     "Scene",
     "Sky",
     "System",
+    "drawable",
     "from_document",
     "gallery",
     "gallery_text",

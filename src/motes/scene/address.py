@@ -8,8 +8,9 @@ only answers: `emit.rate`, or just `rate`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from motes.catalog import Component
@@ -17,6 +18,9 @@ from motes.errors import Problem, SceneError, likely
 
 if TYPE_CHECKING:
     from motes.scene.document import Scene, System
+
+_OWNER = re.compile(r'[a-z ]+( "[^"]*")?: ')
+"""How a line about a component or a table begins."""
 
 MOST_SHOWN = 6
 """Candidates that an error about an address names."""
@@ -70,23 +74,35 @@ def _of_component(
         yield Place(f"{component_address(system, part)}.{name}", words, (*path, name))
 
 
-def placed(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
-    """The scene's plain document with other values at addresses.
+def placed(
+    scene: Scene, values: Mapping[str, Any]
+) -> tuple[dict[str, Any], dict[tuple[str | int, ...], str]]:
+    """The scene's plain document with other values at addresses, and the addresses by path.
 
     Raises SceneError, a line for each address that is unknown or stands for several values.
     """
     menu = list(places(scene))
     document = scene.document()
-    problems = []
+    problems, given = [], {}
     for address, value in values.items():
         found = _found(menu, address)
         if len(found) == 1:
             _put(document, found[0].path, value)
+            given[found[0].path] = address
         else:
             problems.append(Problem((), _unclear(address, found, menu)))
     if problems:
         raise SceneError(problems, source="")
-    return document
+    return document, given
+
+
+def addressed(problem: Problem, given: Mapping[tuple[str | int, ...], str]) -> Problem:
+    """A problem, named by the address under which its value was given."""
+    for path, address in given.items():
+        if problem.path[: len(path)] == path and not problem.message.startswith(f"{address} "):
+            fault = _OWNER.sub("", problem.message)
+            return replace(problem, message=f"{address}: {fault}")
+    return problem
 
 
 def _found(menu: list[Place], address: str) -> list[Place]:

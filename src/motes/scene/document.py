@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -233,11 +233,15 @@ class Scene(Section):
 
         An address may be shortened while it stands for one value only; `addresses` lists them in
         full. Raises SceneError for an unknown or ambiguous address, with the candidates, and for
-        values that do not fit.
+        values that do not fit, with the address as it was given.
         """
-        from motes.scene.address import placed
+        from motes.scene.address import addressed, placed
 
-        return Scene.read(placed(self, values), source="")
+        document, given = placed(self, values)
+        try:
+            return Scene.read(document, source="")
+        except SceneError as error:
+            raise SceneError([addressed(p, given) for p in error.problems], source="") from None
 
     def addresses(self) -> list[str]:
         """The full addresses of all values: `seed`, `film.size`, `water.cone.rate`."""
@@ -267,3 +271,30 @@ def _lists(owner: Section, lists: tuple[str, ...]) -> dict[str, Any]:
 def from_document(document: Mapping[str, Any], source: str = "scene") -> Scene:
     """A scene from plain data, the form of a scene file. Raises SceneError with every problem."""
     return Scene.read(document, source)
+
+
+MOVING = ("emit", "force", "flow", "interact", "retire")
+"""Lists of components that drawing does not look at."""
+
+
+def drawable(document: Mapping[str, Any]) -> dict[str, Any]:
+    """The document of kept frames without unknown components that only moved particles.
+
+    Such a component was declared in a script; its frames are drawn without it.
+    """
+    kept = {key: list(filter(_known(key), document[key])) for key in MOVING if key in document}
+    systems = [drawable(system) for system in document.get("system", ())]
+    return {**document, **kept, **({"system": systems} if systems else {})}
+
+
+def _known(kind: str) -> Callable[[Mapping[str, Any]], bool]:
+    """Whether the catalog has the type of an entry of a list."""
+
+    def known(entry: Mapping[str, Any]) -> bool:
+        try:
+            find(kind, str(entry["type"]))
+        except (SceneError, KeyError):
+            return False
+        return True
+
+    return known

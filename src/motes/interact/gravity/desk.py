@@ -7,15 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.interact.gravity.expansions import Tables
 from motes.interact.gravity.lanes import LANES
 from motes.interact.gravity.morton import LEVELS
-from motes.interact.gravity.translations import Bench, bench
+from motes.interact.gravity.translations import Translations, padded
 
-SOURCES = 2048
+SOURCES = 1536
 """Sources that are packed for one sum over pairs: in single precision they fit the first cache."""
 
-_STACK = 8 * (LEVELS + 2)
+_STACK = 8 * (LEVELS + 2) + LANES
 
 
 class Limits(NamedTuple):
@@ -42,7 +41,10 @@ class Limits(NamedTuple):
 class Desk(NamedTuple):
     """Working memory of one walk."""
 
-    bench: Bench
+    place: NDArray[Any]
+    """(5, lanes) what `Translations` take: coordinates, a factor, and a radius."""
+    chosen: NDArray[np.int32]
+    """(lanes,) the source cells at these places."""
     candidates: NDArray[np.int32]
     """Source cells that are left for a target cell's children, lists of all levels end to end."""
     waiting: NDArray[np.int32]
@@ -50,34 +52,38 @@ class Desk(NamedTuple):
     opened: NDArray[np.int32]
     """(stack,) source cells to test."""
     local: NDArray[Any]
-    """(stack, basis) local terms of waiting target cells."""
+    """(stack, padded basis) local terms of waiting target cells."""
     gathered: NDArray[Any]
     """(basis, lanes) local terms being summed."""
     target: NDArray[Any]
     """(3, largest leaf) targets as the pair law sees them."""
     source: NDArray[Any]
-    """(5, SOURCES + lanes) packed sources: x, y, z, m, and m times the rounding of coordinates."""
+    """(4, SOURCES + lanes) packed sources: x, y, z, m."""
     spans: NDArray[np.int32]
     """(SOURCES, 2) which particles they are."""
     part: NDArray[Any]
     """(5, largest leaf) sums over packed sources."""
     total: NDArray[Any]
     """(5, largest leaf) sums over all sources."""
+    exact: NDArray[np.float64]
+    """(4, lanes) some sources in double precision."""
 
 
-def desk(table: Tables, real: type, largest: int, capacity: int) -> Desk:
+def desk(operations: Translations, real: type, largest: int, capacity: int) -> Desk:
     """Working memory for target leaves of at most `largest` and `capacity` candidates."""
-    width, basis = -(-largest // LANES) * LANES, len(table.degree)
+    width = -(-largest // LANES) * LANES
     return Desk(
-        bench=bench(table, real),
+        place=np.ones((5, LANES), real),
+        chosen=np.zeros(LANES, np.int32),
         candidates=np.empty(capacity, np.int32),
         waiting=np.empty((_STACK, 3), np.int32),
         opened=np.empty(_STACK, np.int32),
-        local=np.empty((_STACK, basis), real),
-        gathered=np.empty((basis, LANES), real),
+        local=np.zeros((_STACK, padded(operations.basis)), real),
+        gathered=np.empty((operations.basis, LANES), real),
         target=np.zeros((3, width), real),
-        source=np.zeros((5, SOURCES + LANES), real),
+        source=np.zeros((4, SOURCES + LANES), real),
         spans=np.empty((SOURCES, 2), np.int32),
         part=np.zeros((5, width), real),
         total=np.zeros((5, width), real),
+        exact=np.zeros((4, LANES)),
     )

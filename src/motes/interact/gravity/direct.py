@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.interact.gravity.lanes import LANES
-from motes.interact.gravity.pairs import TILE, attraction
+from motes.interact.gravity.pairs import attraction
 from motes.jit import blocks, jit, share
 
 SOURCES = 1024
@@ -34,10 +34,8 @@ def _summation(law: str, real: type, potential: bool) -> Callable[..., Any]:
         out[:] = 0
         for low in range(0, source.shape[1], SOURCES):
             high = min(low + SOURCES, source.shape[1])
-            xs, ys, zs = source[0, low:high], source[1, low:high], source[2, low:high]
-            ms = source[3, low:high]
             part[:] = 0
-            attract(target, count, xs, ys, zs, ms, ms, size, size, part)
+            attract(target, count, source[:, low:high], high - low, (0, 0, 0), size, part)
             for i in range(count):
                 out[0, i] += part[0, i]
                 out[1, i] += part[1, i]
@@ -59,19 +57,17 @@ def direct(
     n, count = source.shape[1], target.shape[1]
     padded = np.zeros((4, -(-n // LANES) * LANES), real)
     padded[:, :n] = source
-    rows = max(4 * TILE, min(1024, _PAIRS_OF_A_TASK // max(n, 1) // TILE * TILE))
+    rows = max(16, min(1024, _PAIRS_OF_A_TASK // max(n, 1)))
     ranges = blocks(count, rows)
     out = np.empty((4, count))
     sum_block = _summation(law, real, potential)
 
     def task(number: int) -> None:
         low, high = ranges[number]
-        width = -(-(high - low) // TILE) * TILE
-        block = np.zeros((3, width), real)
-        block[:, : high - low] = target[:, low:high]
+        block, width = np.ascontiguousarray(target[:, low:high]), high - low
         part, result = np.empty((5, width), real), np.empty((4, width))
-        sum_block(block, high - low, padded, real(size), part, result)
-        out[:, low:high] = result[:, : high - low]
+        sum_block(block, width, padded, real(size), part, result)
+        out[:, low:high] = result
 
     share(task, len(ranges))
     return out

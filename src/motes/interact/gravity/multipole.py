@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.interact.gravity.desk import Desk, Limits, desk
-from motes.interact.gravity.expansions import Tables, tables
+from motes.interact.gravity.translations import translations
 from motes.interact.gravity.tree import (
     END,
     RADIUS,
@@ -35,23 +35,27 @@ from motes.jit import blocks, share, threads
 SINGLE_FROM = 4e-6
 """Smallest tolerance that single precision keeps."""
 
-LEAVES = 32
+LEAVES = 16
 """Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
-LEAVES_OF_A_CLASS = 8
+LEAVES_OF_A_CLASS = 4
 """Target leaves out of each further class, which has twice as many as the one before."""
 
-SAFETY = 0.55
+SAFETY = 0.7
 """Part of the tolerance that the error on the sample may use."""
 
-FIRST = 8.0
-"""First trial of what one expansion may neglect, in units of the tolerance."""
+GROWTH = 3.0
+"""First trial of what one expansion may neglect: this to the power of order - 2, times the
+tolerance, as errors of many expansions cancel and the estimate is an upper bound."""
 
 TRIALS = 8
 """Trials before all is summed by pairs."""
 
 STRICTER = 5.0
 """How much less the walk that the sample is compared with may neglect."""
+
+HIGHEST = {True: 9, False: 6}
+"""Highest order of harmonic expansions and of others: code for more is slow to make and run."""
 
 
 @dataclass(frozen=True)
@@ -64,15 +68,16 @@ class Plan:
     """Most particles in a leaf."""
     real: type
     """Precision of expansions and pairs; places are always in double."""
-    opening: float = 0.9
+    opening: float = 1.0
     """Largest (r_A + r_B) / R at which expansions are used, whatever their estimate."""
 
 
-def plan(tolerance: float) -> Plan:
+def plan(tolerance: float, law: str) -> Plan:
     """Order, leaf size and precision that are fast at a tolerance, found by measurement."""
     digits = -math.log10(tolerance)
     real = np.float32 if tolerance >= SINGLE_FROM else np.float64
-    return Plan(order=max(2, round(1.6 * digits)), leaf=128, real=real)
+    order = min(max(2, int(1.2 * digits + 1.5)), HIGHEST[law != "plummer"])
+    return Plan(order=order, leaf=32 if digits < 4 else 48, real=real)
 
 
 def multipole(
@@ -92,7 +97,7 @@ def multipole(
     The rms error on a sample of targets is at most SAFETY times the tolerance, of accelerations
     and, with `potential`, of potentials.
     """
-    problem = Problem.build(source, mass, target, box, law, size, potential, plan(tolerance))
+    problem = Problem.build(source, mass, target, box, law, size, potential, plan(tolerance, law))
     return problem.unsorted(problem.solve(problem.limits_for(tolerance)))
 
 
@@ -102,7 +107,6 @@ class Problem:
 
     targets: Tree
     sources: Tree
-    table: Tables
     law: str
     size: float
     potential: bool
@@ -120,13 +124,13 @@ class Problem:
         plan: Plan,
     ) -> Problem:
         """Sort the particles into trees and compute the moments."""
-        table = tables(plan.order, law != "plummer", plan.real)
-        sources = summarize(octree(source, mass, box, plan.leaf), table, plan.real, True)
+        kind = plan.order, law != "plummer", plan.real
+        sources = summarize(octree(source, mass, box, plan.leaf), *kind, True)
         targets = sources
         if target is not None:
             tree = octree(target, np.full(len(target), 1 / len(target)), box, plan.leaf)
-            targets = summarize(tree, table, plan.real, False)
-        return Problem(targets, sources, table, law, size, potential, plan)
+            targets = summarize(tree, *kind, False)
+        return Problem(targets, sources, law, size, potential, plan)
 
     def limits(self, error: float, force: float, rounding: float) -> Limits:
         """Limits of the walk; those that depend on the particles alone are filled in."""
@@ -135,7 +139,7 @@ class Problem:
             error=error,
             force=force,
             rounding=rounding,
-            few=self.plan.order**3,
+            few=max(self.plan.order**3 // 2, 16),
             size=self.size,
             reach=self.size if self.law == "spline" else 0.0,
             e2=self.size**2 if self.law == "plummer" else 0.0,
@@ -152,21 +156,29 @@ class Problem:
         scale = sample.typical(a)
         pulled = a * self.targets.place[3, sample.rows]
         force = sample.mean_of_most(pulled) * self.targets.place.shape[1] or math.inf
-        rounding = 0.2 * tolerance * scale
-        share = FIRST * tolerance
+        rounding = tolerance * scale
+        share, strictest = tolerance * GROWTH ** (self.plan.order - 2), math.inf
+        kept = None
         for _ in range(TRIALS):
             limits = self.limits(share * scale, share * force, rounding)
-            strict = limits._replace(
-                opening2=limits.opening2 / 2,
-                error=limits.error / STRICTER,
-                force=limits.force / STRICTER,
-                rounding=limits.rounding / STRICTER,
-            )
-            found = self._error(sample, self._at(sample, limits), self._at(sample, strict))
-            if found <= SAFETY * tolerance:
-                return limits
-            share *= min(max(0.8 * SAFETY * tolerance / found, 0.05), 0.5)
-        return self.limits(0.0, 0.0, rounding)
+            if share / STRICTER < strictest:
+                strictest = share / STRICTER
+                strict = limits._replace(
+                    opening2=limits.opening2 / 4,
+                    error=strictest * scale,
+                    force=strictest * force,
+                    rounding=rounding / STRICTER,
+                )
+                exact = self._at(sample, strict)
+            part = self._error(sample, self._at(sample, limits), exact) / (SAFETY * tolerance)
+            if part <= 1.0:
+                if kept is not None or part > 0.6:
+                    return limits
+                kept = limits
+            elif kept is not None:
+                return kept
+            share *= min(max(0.9 / max(part, 1e-9), 0.05), 3.0)
+        return kept or self.limits(0.0, 0.0, rounding)
 
     def solve(self, limits: Limits) -> NDArray[Any]:
         """Sums (4, k) at all targets, in the order of the tree."""
@@ -183,20 +195,21 @@ class Problem:
         return result
 
     def _walk(self, ranges: list[tuple[int, int]], limits: Limits) -> NDArray[Any]:
-        walk = walker(self.law, self.plan.real, self.potential)
+        walk = walker(self.law, self.plan.real, self.potential, self.plan.order)
+        operations = translations(self.plan.order, self.law != "plummer")
         same, largest = self.targets is self.sources, largest_leaf(self.targets)
         rows = 4 if self.potential else 3
         out: NDArray[Any] = np.empty((rows, self.targets.place.shape[1]), self.plan.real)
         desks: SimpleQueue[Desk] = SimpleQueue()
         for _ in range(threads()):
-            desks.put(desk(self.table, self.plan.real, largest, 1 << 16))
+            desks.put(desk(operations, self.plan.real, largest, 1 << 16))
 
         def task(number: int) -> None:
             own = desks.get()
             while walk(
-                self.targets, self.sources, same, *ranges[number], self.table, limits, own, out
+                self.targets, self.sources, same, *ranges[number], limits, own, out
             ):
-                own = desk(self.table, self.plan.real, largest, 2 * own.candidates.size)
+                own = desk(operations, self.plan.real, largest, 2 * own.candidates.size)
             desks.put(own)
 
         share(task, len(ranges))

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from motes.interact.gravity.desk import SOURCES, Desk, Limits
-from motes.interact.gravity.lanes import LANES, fma, read, spread, write
+from motes.interact.gravity.lanes import LANES, read, spread, total, write
 from motes.interact.gravity.pairs import attraction
 from motes.interact.gravity.softening import center_depth, pair_law
 from motes.interact.gravity.tree import END, MASS, RADIUS, START, Tree, X, Y, Z
 from motes.jit import jit
 
-ROUNDING = 1e-7
+ROUNDING = 6e-8
 """Change of a difference of coordinates by single precision, in units of the largest of them."""
 
 
@@ -36,61 +36,65 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
 
     @jit
     def sum_exactly(
-        sources: Tree, spans: Any, count: Any, place: Any, size: Any, part: Any
+        sources: Tree, spans: Any, count: Any, place: Any, size: Any, some: Any, part: Any
     ) -> None:
-        ax = ay = az = value = 0.0
+        x, y, z = spread(place[0]), spread(place[1]), spread(place[2])
+        sizes = spread(size), spread(1.0 / size if size > 0.0 else 0.0)
+        ax = ay = az = value = spread(0.0)
         for k in range(count):
-            xs = sources.place[0, spans[k, 0] : spans[k, 1]]
-            ys = sources.place[1, spans[k, 0] : spans[k, 1]]
-            zs = sources.place[2, spans[k, 0] : spans[k, 1]]
-            ms = sources.place[3, spans[k, 0] : spans[k, 1]]
-            for j in range(xs.size):
-                dx, dy, dz = xs[j] - place[0], ys[j] - place[1], zs[j] - place[2]
-                s, w = exact(dx * dx + dy * dy + dz * dz, size)
-                s *= ms[j]
-                ax, ay, az, value = ax + s * dx, ay + s * dy, az + s * dz, value + w * ms[j]
-        part[0], part[1], part[2] = ax, ay, az
-        if potential:
-            part[4] = value
+            for first in range(spans[k, 0], spans[k, 1], LANES):
+                some[3] = 0.0
+                for lane in range(min(LANES, spans[k, 1] - first)):
+                    for row in range(4):
+                        some[row, lane] = sources.place[row, first + lane]
+                dx, dy, dz = read(some[0], 0) - x, read(some[1], 0) - y, read(some[2], 0) - z
+                s, w = exact(dx * dx + dy * dy + dz * dz, sizes)
+                m = read(some[3], 0)
+                s = s * m
+                ax, ay, az, value = ax + s * dx, ay + s * dy, az + s * dz, value + w * m
+        part[0], part[1], part[2], part[4] = total(ax), total(ay), total(az), total(value)
 
     @jit
     def sum_packed(
-        targets: Tree, sources: Tree, cell: Any, packed: Any, spans: Any, distance: Any,
-        has_itself: Any, limits: Limits, desk: Desk,
+        targets: Tree, sources: Tree, cell: Any, packed: Any, spans: Any, distance: Any, own: Any,
+        limits: Limits, desk: Desk,
     ) -> None:  # fmt: skip
         start = targets.cells[cell, START]
         count = targets.cells[cell, END] - start
-        part, total, source = desk.part, desk.total, desk.source
+        part, source = desk.part, desk.source
         # Massless sources where no target is make the number a multiple of the lanes.
         while packed % LANES > 0:
             source[0, packed] = source[1, packed] = source[2, packed] = 4.0 * distance
-            source[3, packed] = source[4, packed] = 0.0
+            source[3, packed] = 0.0
             packed += 1
         part[:] = 0
-        alarm = part.dtype.type(2.0 * limits.rounding)
-        xs, ys, zs = source[0, :packed], source[1, :packed], source[2, :packed]
-        ms, wrongs, size = source[3, :packed], source[4, :packed], part.dtype.type(limits.size)
-        attract(desk.target, count, xs, ys, zs, ms, wrongs, size, alarm, part)
+        attract(desk.target, count, source, packed, own, part.dtype.type(limits.size), part)
         if single:
-            # A particle in its own leaf sounds one alarm itself.
-            limit = limits.rounding + (alarm if has_itself else 0.0)
+            # Twice the change of s dx by coordinates that are wrong by a little.
+            blur = 2.0 * ROUNDING * (distance + targets.bodies[cell, RADIUS])
             for i in range(count):
-                if not part[3, i] <= limit:
+                if potential and own[0] <= i < own[1] and depth > 0.0:
+                    part[4, i] += targets.near[3, start + i] * (depth / limits.size)
+                x = part[0, i]
+                if not blur * part[3, i] <= limits.rounding or not x == x:
                     place = targets.place[:, start + i]
-                    sum_exactly(sources, desk.spans, spans, place, limits.size, part[:, i])
+                    sum_exactly(
+                        sources, desk.spans, spans, place, limits.size, desk.exact, part[:, i]
+                    )
         for row in range(5):
-            for i in range(count):
-                total[row, i] += part[row, i]
+            if row != 3:
+                for i in range(count):
+                    desk.total[row, i] += part[row, i]
 
     @jit
     def sum_near(
         targets: Tree, sources: Tree, same: Any, cell: Any, leaves: Any, limits: Limits, desk: Desk
     ) -> None:
-        cells, bodies, near = sources.cells, sources.bodies, targets.near
+        cells, bodies = sources.cells, sources.bodies
         source, target, spans = desk.source, desk.target, desk.spans
-        old_x, old_y, old_z = sources.near[0], sources.near[1], sources.near[2]
-        old_m, new_wrong = sources.near[3], source[4]
         new_x, new_y, new_z, new_m = source[0], source[1], source[2], source[3]
+        near = sources.near
+        old_x, old_y, old_z, old_m = near[0], near[1], near[2], near[3]
         kind = source.dtype.type
         x, y, z = targets.bodies[cell, X], targets.bodies[cell, Y], targets.bodies[cell, Z]
         radius = targets.bodies[cell, RADIUS]
@@ -98,45 +102,40 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
         count = targets.cells[cell, END] - start
         for axis in range(3):
             for i in range(count):
-                target[axis, i] = near[axis, start + i]
-        one, nothing = spread(kind(1)), spread(kind(0))
+                target[axis, i] = targets.near[axis, start + i]
         packed = pieces = 0
-        distance, has_itself = radius, False
+        distance, own = radius, (0, 0, 0)
         for k in range(leaves.size):
             leaf = leaves[k]
             first, last = cells[leaf, START], cells[leaf, END]
             itself = same and leaf == cell
             if itself and radius == 0.0:
-                if potential:
-                    value = kind(bodies[leaf, MASS] * depth / (limits.size if depth > 0.0 else 1.0))
-                    desk.total[4, :count] += value
+                if potential and depth > 0.0:
+                    desk.total[4, :count] += kind(bodies[leaf, MASS] * (depth / limits.size))
                 continue
             dx, dy, dz = bodies[leaf, X] - x, bodies[leaf, Y] - y, bodies[leaf, Z] - z
             reach = np.sqrt(dx * dx + dy * dy + dz * dz) + bodies[leaf, RADIUS]
-            shift = (kind(dx), kind(dy), kind(dz)) if single else (kind(0), kind(0), kind(0))
+            sx = sy = sz = spread(kind(0))
+            if single:
+                sx, sy, sz = spread(kind(dx)), spread(kind(dy)), spread(kind(dz))
             while first < last:
                 taken = min(last - first, SOURCES - packed)
                 distance = max(distance, reach)
-                has_itself = has_itself or itself
-                wrong = spread(kind(ROUNDING * (reach + radius)))
+                if itself:
+                    own = (first - start, first - start + taken, packed - (first - start))
                 # The last lanes may hold more than this leaf; what follows overwrites them.
                 for i in range(0, taken, LANES):
-                    write(new_x, packed + i, fma(read(old_x, first + i), one, spread(shift[0])))
-                    write(new_y, packed + i, fma(read(old_y, first + i), one, spread(shift[1])))
-                    write(new_z, packed + i, fma(read(old_z, first + i), one, spread(shift[2])))
-                    mass = read(old_m, first + i)
-                    write(new_m, packed + i, mass)
-                    if single:
-                        write(new_wrong, packed + i, fma(mass, wrong, nothing))
+                    write(new_x, packed + i, read(old_x, first + i) + sx)
+                    write(new_y, packed + i, read(old_y, first + i) + sy)
+                    write(new_z, packed + i, read(old_z, first + i) + sz)
+                    write(new_m, packed + i, read(old_m, first + i))
                 spans[pieces, 0], spans[pieces, 1] = first, first + taken
                 pieces, packed, first = pieces + 1, packed + taken, first + taken
                 if packed == SOURCES:
-                    sum_packed(
-                        targets, sources, cell, packed, pieces, distance, has_itself, limits, desk
-                    )
+                    sum_packed(targets, sources, cell, packed, pieces, distance, own, limits, desk)
                     packed = pieces = 0
-                    distance, has_itself = radius, False
+                    distance, own = radius, (0, 0, 0)
         if packed > 0:
-            sum_packed(targets, sources, cell, packed, pieces, distance, has_itself, limits, desk)
+            sum_packed(targets, sources, cell, packed, pieces, distance, own, limits, desk)
 
     return sum_near  # type: ignore[no-any-return]

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from motes.interact.gravity.lanes import choose, inverse_root, maximum, rough_inverse_root, spread
 from motes.jit import jit
 
 SUPPORT = 2.8
@@ -20,9 +21,6 @@ SUPPORT = 2.8
 
 With 2.8, a spline is as deep in its middle as a Plummer law of the same softening.
 """
-
-TINY = np.float32(1e-37)
-"""Least normal number of single precision, nearly."""
 
 LAWS = ("newton", "plummer", "spline")
 
@@ -32,82 +30,94 @@ def center_depth(law: str, size: float) -> float:
     return {"newton": 0.0, "plummer": 1.0, "spline": SUPPORT}[law] / (size or 1.0)
 
 
+LEAST = {np.float32: 1e-24, np.float64: 1e-37}
+"""Least squared distance that is told from 0, in boxes: the cube of its root is still a number."""
+
+PART = {np.float32: 2 / 3, np.float64: 1.0}
+"""What a law gives of s: in single precision it is cheaper to leave a factor to the end."""
+
+
 @cache
-def pair_law(law: str, real: type) -> Callable[..., Any]:
-    """Compiled function (r2, size) -> (s, w) for numbers of type `real`.
+def pair_law(law: str, real: type, guarded: bool = True) -> Callable[..., Any]:
+    """Compiled function (r2, size) -> (PART s, w), of lanes of type `real`.
 
-    `size` is a length: Plummer's softening, or the spline's support radius. Sources: Plummer,
-    MNRAS 71 (1911) 460; the spline of Monaghan and Lattanzio, A&A 149 (1985) 135, as in Springel,
-    Yoshida and White, New Astronomy 6 (2001) 79, equation A1 and its gradient.
+    `size` is a length and its inverse: Plummer's softening, or the spline's support radius. Not `guarded`, Newton's
+    law is not a number at r = 0. Sources: Plummer, MNRAS 71 (1911) 460; the spline of Monaghan and
+    Lattanzio, A&A 149 (1985) 135, as in Springel, Yoshida and White, New Astronomy 6 (2001) 79,
+    equation A1 and its gradient.
     """
-    return {"newton": _newton, "plummer": _plummer, "spline": _spline}[law](real)
+    powers = _powers(real)
+    if law == "plummer":
+        return _plummer(powers)
+    return _newton(powers, real, guarded) if law == "newton" else _spline(powers, real)
 
 
-def _inverse_root(real: type) -> Callable[..., Any]:
-    """Compiled function 1 / sqrt(x), 0 where x = 0 (or under 1e-37).
+def _powers(real: type) -> Callable[..., Any]:
+    """Compiled function r2 -> (PART / r^3, 1 / r).
 
-    In double precision the estimate comes from single precision, where processors have a fast one,
-    and one step of Householder's third-order iteration brings its 22 bits to 53.
+    In single precision both come from an estimate y of 1 / r, wrong by a few 1e-4, with the first
+    terms of their Taylor series in 1 - r^2 y^2: 1 / r = y (3 - r^2 y^2) / 2 and
+    1 / r^3 = y^3 (5 - 3 r^2 y^2) / 2, wrong by some 1e-7.
     """
-    single_zero, single_one = np.float32(0), np.float32(1)
+    a, b, c = real(5 / 3), real(1.5), real(0.5)
 
     @jit(inline=True)
-    def single(x: Any) -> Any:
-        return single_one / np.sqrt(x) if x > single_zero else single_zero
+    def single(r2: Any) -> Any:
+        y = rough_inverse_root(r2)
+        y2 = y * y
+        return y * (y2 * (spread(a) - r2 * y2)), y * (spread(b) - spread(c) * (r2 * y2))
 
     @jit(inline=True)
-    def double(x: Any) -> Any:
-        near = np.float32(x)
-        y = np.float64(single_one / np.sqrt(near)) if near > TINY else 0.0
-        h = 1.0 - x * y * y
-        return y + y * h * (0.5 + 0.375 * h)
+    def double(r2: Any) -> Any:
+        y = inverse_root(r2)
+        return y * y * y, y
 
     return single if real is np.float32 else double  # type: ignore[no-any-return]
 
 
-def _newton(real: type) -> Callable[..., Any]:
-    inverse_root = _inverse_root(real)
-
-    @jit(inline=True)
-    def newton(r2: Any, size: Any) -> Any:
-        inverse = inverse_root(r2)
-        return inverse * inverse * inverse, inverse
-
-    return newton  # type: ignore[no-any-return]
-
-
-def _plummer(real: type) -> Callable[..., Any]:
-    inverse_root = _inverse_root(real)
-
+def _plummer(powers: Callable[..., Any]) -> Callable[..., Any]:
     @jit(inline=True)
     def plummer(r2: Any, size: Any) -> Any:
-        inverse = inverse_root(r2 + size * size)
-        return inverse * inverse * inverse, inverse
+        return powers(r2 + size[0] * size[0])
 
     return plummer  # type: ignore[no-any-return]
 
 
-def _spline(real: type) -> Callable[..., Any]:
-    half, one = real(0.5), real(1)
-    inverse_root = _inverse_root(real)
-    f0, f2, f3 = real(32 / 3), real(-38.4), real(32)
-    g_, g0, g1, g2, g3 = real(-1 / 15), real(64 / 3), real(-48), real(38.4), real(-32 / 3)
-    v0, v2, v4, v5 = real(14 / 5), real(-16 / 3), real(48 / 5), real(-32 / 5)
+def _newton(powers: Callable[..., Any], real: Any, guarded: bool) -> Callable[..., Any]:
+    least, nothing = real(LEAST[real]), real(0)
+
+    @jit(inline=True)
+    def newton(r2: Any, size: Any) -> Any:
+        if not guarded:
+            return powers(r2)
+        s, w = powers(maximum(r2, spread(least)))
+        return s, choose(spread(least), r2, w, spread(nothing))
+
+    return newton  # type: ignore[no-any-return]
+
+
+def _spline(powers: Callable[..., Any], real: Any) -> Callable[..., Any]:
+    half, one, least = real(0.5), real(1), real(LEAST[real])
+    part = PART[real]
+    f0, f2, f3 = (real(part * c) for c in (32 / 3, -38.4, 32.0))
+    g_, g0, g1, g2, g3 = (real(part * c) for c in (-1 / 15, 64 / 3, -48.0, 38.4, -32 / 3))
+    v0, v2, v4, v5 = (real(c) for c in (14 / 5, -16 / 3, 48 / 5, -32 / 5))
     w_, w0, w2, w3, w4, w5 = (real(c) for c in (-1 / 15, 16 / 5, -32 / 3, 16.0, -48 / 5, 32 / 15))
 
     @jit(inline=True)
     def spline(r2: Any, size: Any) -> Any:
-        inverse = inverse_root(r2)
-        scale = one / size
-        u = r2 * inverse * scale
-        v = inverse * size
-        inner = f0 + u * u * (f2 + f3 * u)
-        outer = g_ * v * v * v + g0 + u * (g1 + u * (g2 + u * g3))
-        factor = (inner if u < half else outer) * (scale * scale * scale)
-        s = factor if u < one else inverse * inverse * inverse
-        inner = v0 + u * u * (v2 + u * u * (v4 + u * v5))
-        outer = w_ * v + w0 + u * u * (w2 + u * (w3 + u * (w4 + u * w5)))
-        depth = (inner if u < half else outer) * scale
-        return s, depth if u < one else inverse
+        size, scale = size
+        cube, inverse = powers(maximum(r2, spread(least)))
+        u, v = r2 * inverse * scale, inverse * size
+        inner = spread(f0) + u * u * (spread(f2) + spread(f3) * u)
+        outer = spread(g1) + u * (spread(g2) + u * spread(g3))
+        outer = spread(g_) * v * v * v + spread(g0) + u * outer
+        factor = choose(u, spread(half), inner, outer) * (scale * scale * scale)
+        inner = spread(v0) + u * u * (spread(v2) + u * u * (spread(v4) + u * spread(v5)))
+        outer = spread(w2) + u * (spread(w3) + u * (spread(w4) + u * spread(w5)))
+        outer = spread(w_) * v + spread(w0) + u * u * outer
+        depth = choose(u, spread(half), inner, outer) * scale
+        near = spread(one)
+        return choose(u, near, factor, cube), choose(u, near, depth, inverse)
 
     return spline  # type: ignore[no-any-return]

@@ -2,273 +2,158 @@
 
 Lengths are in units of a cell's radius h and, between two cells, of their distance R, so that no
 power under- or overflows in single precision: moments are kept as M_b / h^|b| and local terms as
-L_a h^|a|. Up to LANES particles, children or source cells go through an operation together.
+L_a h^|a|. Up to LANES particles, children or source cells go through an operation together; each
+operation is straight-line code for its order.
 """
 
-# mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from motes.interact.gravity.expansions import (
+    UNITS,
+    derivatives,
+    folded,
+    minus,
+    monomials,
+    plus,
+    powers,
+    products,
+    terms,
+    unfolded,
+)
+from motes.interact.gravity.lanes import LANES
+from motes.interact.gravity.traced import gathered, inverse_root, ones, scattered, total, traced
 
-from motes.interact.gravity.expansions import GROUP, Tables
-from motes.interact.gravity.lanes import LANES, fma, load, spread, store
-from motes.jit import jit
-
-
-class Bench(NamedTuple):
-    """Working memory of the operations; rows are LANES wide."""
-
-    place: NDArray[Any]
-    """(5, lanes) coordinates and a factor, the input of every operation, and one free row."""
-    ratio: NDArray[Any]
-    """(lanes,) radius of each child or source cell."""
-    moments: NDArray[Any]
-    """(basis, lanes) the input moments."""
-    powers: NDArray[Any]
-    """(order + 1, lanes)"""
-    monomials: NDArray[Any]
-    """(all, lanes)"""
-    slopes: NDArray[Any]
-    """(slopes + 1, lanes), the last one zero."""
-    sums: NDArray[Any]
-    """(all, lanes)"""
-    whole: NDArray[Any]
-    """(all,) one expansion with all of its terms."""
+Operation = Callable[..., None]
 
 
-def bench(table: Tables, real: type) -> Bench:
-    """Working memory for one thread."""
-    order = int(table.degree[-1])
-    whole, basis = len(table.monomial), len(table.degree)
+class Translations(NamedTuple):
+    """The operations of one order, for kernels. `place` is (5, LANES) throughout."""
 
-    def rows(count: int) -> NDArray[Any]:
-        return np.zeros((count, LANES), real)
+    particles_to_moments: Operation
+    """(place, sums): add to `sums` (every, LANES) those of particles at -place[:3], masses
+    place[3], in units of the cell's radius."""
+    sums_to_moments: Operation
+    """(sums, moments): the moments (basis,) of a cell."""
+    moments_to_moments: Operation
+    """(place, chosen, table, moments): moments (basis,) of a cell from rows `chosen` of a table,
+    those of its children; place[:3] is the parent's center from the child's and place[4] the
+    child's radius, in the parent's radius; place[3] is 1, and 0 in unused lanes."""
+    moments_to_local: Operation
+    """(place, chosen, table, h, e2, local): add to `local` (basis, LANES) the terms, in a cell of
+    radius h, of source cells whose moments are rows `chosen` of a table; place[:3] is the target's
+    center from the source's and place[4] its radius; place[3] is 1, and 0 in unused lanes; e2 is
+    the squared softening."""
+    lanes_to_local: Operation
+    """(local, terms): add the lane sums of `local` (basis, LANES) to terms (basis,)."""
+    local_to_local: Operation
+    """(place, terms, table, first): terms of a cell's children in rows `first` + lane of a table;
+    place[:3] is the child's center from the cell's, and place[4] its radius, in the cell's."""
+    local_to_particles: Operation
+    """(place, terms, scale, out): to rows 0 to 2 of `out` the gradient at place[:3], in the cell's
+    radius, times `scale`, and to row 3 the value."""
+    basis: int
+    """Numbers in an expansion."""
+    every: int
+    """Terms in all."""
 
-    return Bench(
-        place=rows(5),
-        ratio=np.ones(LANES, real),
-        moments=rows(basis),
-        powers=rows(order + 1),
-        monomials=rows(whole),
-        slopes=rows(len(table.slope_first)),
-        sums=rows(max(whole, basis)),
-        whole=np.zeros(whole, real),
+
+@cache
+def translations(order: int, harmonic: bool) -> Translations:
+    """The operations on expansions of one order."""
+    kind = terms(order, harmonic)
+    basis, every = kind.basis, kind.every
+
+    @traced
+    def particles_to_moments(place: Any, sums: Any) -> None:
+        found = monomials(order, (place[0], place[1], place[2]), place[3])
+        for row, t in enumerate(every):
+            sums[row] = sums[row] + found[t]
+
+    @traced
+    def sums_to_moments(sums: Any, moments: Any) -> None:
+        whole = {t: sums[row] for row, t in enumerate(every)}
+        for row, moment in enumerate(folded(kind, whole)):
+            moments[row] = total(moment)
+
+    @traced
+    def moments_to_moments(place: Any, chosen: Any, table: Any, moments: Any) -> None:
+        power = powers(order, place[4], place[3])
+        given = gathered(table, chosen, len(basis))
+        old = {b: m * power[sum(b)] for b, m in zip(basis, given, strict=True)}
+        shift = monomials(order, (place[0], place[1], place[2]), ones(place[0]))
+        new = products(
+            [
+                [(old[c], shift[minus(b, c)]) for c in basis if min(minus(b, c)) >= 0]
+                for b in every
+            ]
+        )
+        for row, moment in enumerate(folded(kind, dict(zip(every, new, strict=True)))):
+            moments[row] = total(moment)
+
+    @traced
+    def moments_to_local(
+        place: Any, chosen: Any, table: Any, h: Any, e2: Any, local: Any
+    ) -> None:
+        x, y, z = place[0], place[1], place[2]
+        inverse = inverse_root(x * x + y * y + z * z + e2)
+        slopes = derivatives(order, harmonic, (x * inverse, y * inverse, z * inverse), ones(x))
+        power = powers(order, place[4] * inverse, place[3] * inverse)
+        given = gathered(table, chosen, len(basis))
+        moments = {b: m * power[sum(b)] for b, m in zip(basis, given, strict=True)}
+        power = powers(order, h * inverse, ones(x))
+        values = products(
+            [
+                [(moments[b], slopes[plus(a, b)]) for b in basis if sum(a) + sum(b) <= order]
+                for a in basis
+            ]
+        )
+        for row, (a, value) in enumerate(zip(basis, values, strict=True)):
+            local[row] = local[row] + value * power[sum(a)]
+
+    @traced
+    def lanes_to_local(local: Any, terms: Any) -> None:
+        for row in range(len(basis)):
+            terms[row] = terms[row] + total(local[row])
+
+    @traced
+    def local_to_local(place: Any, terms: Any, table: Any, first: Any) -> None:
+        whole = unfolded(kind, [terms[row] for row in range(len(basis))])
+        shift = monomials(order, (place[0], place[1], place[2]), ones(place[0]))
+        power = powers(order, place[4], ones(place[4]))
+        new = products(
+            [
+                [(whole[plus(a, b)], shift[b]) for b in every if sum(a) + sum(b) <= order]
+                for a in basis
+            ]
+        )
+        scattered([v * power[sum(a)] for a, v in zip(basis, new, strict=True)], table, first)
+
+    @traced
+    def local_to_particles(place: Any, terms: Any, scale: Any, out: Any) -> None:
+        whole = unfolded(kind, [terms[row] for row in range(len(basis))])
+        shift = monomials(order, (place[0], place[1], place[2]), ones(place[0]))
+        inner = [t for t in every if sum(t) < order]
+        sums = [[(whole[plus(t, unit)], shift[t]) for t in inner] for unit in UNITS]
+        x, y, z, value = products([*sums, [(whole[t], shift[t]) for t in every]])
+        out[0], out[1], out[2], out[3] = x * scale, y * scale, z * scale, value
+
+    return Translations(
+        particles_to_moments,
+        sums_to_moments,
+        moments_to_moments,
+        moments_to_local,
+        lanes_to_local,
+        local_to_local,
+        local_to_particles,
+        len(basis),
+        len(every),
     )
 
 
-@jit
-def raise_monomials(table: Tables, bench: Bench) -> None:
-    """All y^a / a! times the factor in place[3], of coordinates in place[:3]."""
-    store(bench.monomials, 0, load(bench.place, 3))
-    nothing = spread(table.factor[0] - table.factor[0])
-    for row in range(1, table.monomial.shape[0]):
-        axis, parent = table.monomial[row, 0], table.monomial[row, 1]
-        step = fma(load(bench.place, axis), spread(table.factor[row]), nothing)
-        store(bench.monomials, row, fma(step, load(bench.monomials, parent), nothing))
-
-
-@jit
-def fold(table: Tables, whole: Any, moments: Any) -> None:
-    """Express moments of all terms by those of the basis."""
-    for step in range(table.trace.shape[0]):
-        value = whole[table.trace[step, 0]]
-        whole[table.trace[step, 1]] -= value
-        whole[table.trace[step, 2]] -= value
-    for row in range(table.kept.size):
-        moments[row] = whole[table.kept[row]]
-
-
-@jit
-def unfold(table: Tables, local: Any, whole: Any) -> None:
-    """All local terms from those of the basis."""
-    for row in range(table.kept.size):
-        whole[table.kept[row]] = local[row]
-    for back in range(table.trace.shape[0]):
-        step = table.trace.shape[0] - 1 - back
-        whole[table.trace[step, 0]] = -(whole[table.trace[step, 1]] + whole[table.trace[step, 2]])
-
-
-@jit
-def add_lanes(rows: Any, count: Any, total: Any) -> None:
-    """Sum each of the first `count` rows over its lanes."""
-    for row in range(count):
-        total[row] = rows[row].sum()
-
-
-@jit
-def particles_to_moments(
-    table: Tables, bench: Bench, particles: Any, count: Any, scale: Any, moments: Any
-) -> None:
-    """Moments of the first `count` particles: rows x, y, z from the cell's center, and m.
-
-    `scale` is one over the cell's radius.
-    """
-    bench.sums[:] = 0
-    for first in range(0, count, LANES):
-        for lane in range(LANES):
-            i = min(first + lane, count - 1)
-            for axis in range(3):
-                bench.place[axis, lane] = -particles[axis, i] * scale
-            bench.place[3, lane] = particles[3, i] if first + lane < count else 0
-        raise_monomials(table, bench)
-        one = spread(table.factor[0])
-        for row in range(bench.whole.size):
-            store(bench.sums, row, fma(load(bench.monomials, row), one, load(bench.sums, row)))
-    add_lanes(bench.sums, bench.whole.size, bench.whole)
-    fold(table, bench.whole, moments)
-
-
-@jit
-def scale_moments(table: Tables, bench: Bench) -> None:
-    """Multiply the moments of degree n by the n-th power of `ratio`, times place[3]."""
-    for lane in range(LANES):
-        bench.powers[0, lane] = bench.place[3, lane]
-    for n in range(1, bench.powers.shape[0]):
-        for lane in range(LANES):
-            bench.powers[n, lane] = bench.powers[n - 1, lane] * bench.ratio[lane]
-    nothing = spread(table.factor[0] - table.factor[0])
-    for row in range(table.kept.size):
-        power = load(bench.powers, table.degree[row])
-        store(bench.moments, row, fma(load(bench.moments, row), power, nothing))
-
-
-@jit
-def moments_to_moments(table: Tables, bench: Bench, moments: Any) -> None:
-    """A parent's moments from its children's.
-
-    place[:3] is the parent's center from the child's, in the parent's radius; `ratio` is the
-    child's radius in the same unit; place[3] is 1, and 0 in unused lanes.
-    """
-    scale_moments(table, bench)
-    raise_monomials(table, bench)
-    nothing = spread(table.factor[0] - table.factor[0])
-    for row in range(bench.whole.size):
-        total = nothing
-        for k in range(table.up_first[row], table.up_first[row + 1]):
-            moment = load(bench.moments, table.up[k, 0])
-            total = fma(moment, load(bench.monomials, table.up[k, 1]), total)
-        store(bench.sums, row, total)
-    add_lanes(bench.sums, bench.whole.size, bench.whole)
-    fold(table, bench.whole, moments)
-
-
-@jit
-def differentiate(table: Tables, bench: Bench) -> None:
-    """All derivatives of the potential at the unit places in place[:3], with place[3] = 1."""
-    nothing = spread(table.factor[0] - table.factor[0])
-    store(bench.slopes, 0, load(bench.place, 3))
-    for row in range(1, table.slope_first.size - 1):
-        total = nothing
-        for k in range(table.slope_first[row], table.slope_first[row + 1]):
-            slope = load(bench.slopes, table.slope_terms[k, 0])
-            factor = fma(
-                load(bench.place, table.slope_terms[k, 1]), spread(table.slope_factors[k]), nothing
-            )
-            total = fma(slope, factor, total)
-        store(bench.slopes, row, total)
-
-
-@jit
-def moments_to_local(table: Tables, bench: Bench, h: Any, e2: Any, local: Any) -> None:
-    """Add the local terms, in a cell of radius `h`, of up to LANES source cells.
-
-    place[:3] is the target's center from the source's; place[3] is 1, and 0 in unused lanes; e2 is
-    the squared softening. `local` is (basis, lanes): the sum over lanes is left to the end.
-    """
-    for lane in range(LANES):
-        x, y, z = bench.place[0, lane], bench.place[1, lane], bench.place[2, lane]
-        inverse = table.factor[0] / np.sqrt(x * x + y * y + z * z + e2)
-        bench.place[0, lane] = x * inverse
-        bench.place[1, lane] = y * inverse
-        bench.place[2, lane] = z * inverse
-        bench.place[3, lane] *= inverse
-        bench.ratio[lane] *= inverse
-        bench.place[4, lane] = inverse
-    scale_moments(table, bench)
-    one = table.factor[0]
-    for lane in range(LANES):
-        bench.place[3, lane] = one
-        bench.powers[0, lane] = one
-        bench.ratio[lane] = h * bench.place[4, lane]
-    for n in range(1, bench.powers.shape[0]):
-        for lane in range(LANES):
-            bench.powers[n, lane] = bench.powers[n - 1, lane] * bench.ratio[lane]
-    differentiate(table, bench)
-    nothing = spread(one - one)
-    k = 0
-    for group in range(table.meets.size):
-        a0 = a1 = a2 = a3 = nothing
-        for moment_row in range(table.meets[group]):
-            moment = load(bench.moments, moment_row)
-            a0 = fma(moment, load(bench.slopes, table.meeting[k, 0]), a0)
-            a1 = fma(moment, load(bench.slopes, table.meeting[k, 1]), a1)
-            a2 = fma(moment, load(bench.slopes, table.meeting[k, 2]), a2)
-            a3 = fma(moment, load(bench.slopes, table.meeting[k, 3]), a3)
-            k += 1
-        row = GROUP * group
-        for step, total in enumerate((a0, a1, a2, a3)):
-            power = load(bench.powers, table.degree[row + step])
-            store(local, row + step, fma(total, power, load(local, row + step)))
-
-
-@jit
-def local_to_local(table: Tables, bench: Bench, local: Any) -> None:
-    """Children's local terms from `bench.whole`, the parent's.
-
-    place[:3] is the child's center from the parent's, in the parent's radius; place[3] is 1;
-    `ratio` is the child's radius in the same unit. `local` is (children, basis).
-    """
-    raise_monomials(table, bench)
-    for lane in range(LANES):
-        bench.powers[0, lane] = table.factor[0]
-    for n in range(1, bench.powers.shape[0]):
-        for lane in range(LANES):
-            bench.powers[n, lane] = bench.powers[n - 1, lane] * bench.ratio[lane]
-    nothing = spread(table.factor[0] - table.factor[0])
-    for row in range(table.kept.size):
-        total = nothing
-        for k in range(table.down_first[row], table.down_first[row + 1]):
-            term = spread(bench.whole[table.down[k, 0]])
-            total = fma(term, load(bench.monomials, table.down[k, 1]), total)
-        store(bench.sums, row, fma(total, load(bench.powers, table.degree[row]), nothing))
-        for child in range(local.shape[0]):
-            local[child, row] = bench.sums[row, child]
-
-
-@jit
-def local_to_particles(
-    table: Tables, bench: Bench, target: Any, count: Any, scale: Any, potential: bool, total: Any
-) -> None:
-    """Add the field of `bench.whole` at `count` targets, rows x, y, z from the cell's center.
-
-    `scale` is one over the cell's radius. The gradient goes to rows 0 to 2 of `total`, and with
-    `potential` the sum itself to row 4.
-    """
-    one = table.factor[0]
-    nothing = spread(one - one)
-    for first in range(0, count, LANES):
-        for lane in range(LANES):
-            i = min(first + lane, count - 1)
-            for axis in range(3):
-                bench.place[axis, lane] = target[axis, i] * scale
-            bench.place[3, lane] = one
-        raise_monomials(table, bench)
-        gx = gy = gz = value = nothing
-        for row in range(table.next.shape[1]):
-            monomial = load(bench.monomials, row)
-            gx = fma(monomial, spread(bench.whole[table.next[0, row]]), gx)
-            gy = fma(monomial, spread(bench.whole[table.next[1, row]]), gy)
-            gz = fma(monomial, spread(bench.whole[table.next[2, row]]), gz)
-        if potential:
-            for row in range(bench.whole.size):
-                value = fma(load(bench.monomials, row), spread(bench.whole[row]), value)
-        for axis, lanes in enumerate((gx, gy, gz, value)):
-            store(bench.place, axis, lanes)
-        for lane in range(min(LANES, count - first)):
-            for axis in range(3):
-                total[axis, first + lane] += bench.place[axis, lane] * scale
-            if potential:
-                total[4, first + lane] += bench.place[3, lane]
+def padded(count: int) -> int:
+    """Columns of a table of expansions of `count` numbers."""
+    return -(-count // LANES) * LANES

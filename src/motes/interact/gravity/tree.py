@@ -3,34 +3,30 @@
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.interact.gravity.expansions import Tables
 from motes.interact.gravity.lanes import LANES
 from motes.interact.gravity.morton import LEVELS, morton_order
-from motes.interact.gravity.translations import (
-    Bench,
-    bench,
-    moments_to_moments,
-    particles_to_moments,
-)
+from motes.interact.gravity.translations import padded, translations
 from motes.jit import blocks, jit, share
 
 START, END, SKIP = 0, 1, 2
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
 
-FEW = 8
+FEW = 4
 """Most particles in leaves that are much larger than usual.
 
 Such a leaf has a side that is near to very many small cells, in all of which it would see particles
 only, and expansions around its center hardly converge at its edge.
 """
 
-FINER = 3
+FINER = 1
 """Levels from a usual leaf up to one that is much larger."""
 
 LIGHT = 1e-30
@@ -55,7 +51,19 @@ class Tree(NamedTuple):
     near: NDArray[Any]
     """(4, n + lanes) x, y, z, m for pairs: in single precision from the leaf's center."""
     moments: NDArray[Any]
-    """(cells, basis)"""
+    """(cells, padded basis)"""
+
+
+@jit(inline=True)
+def _first_of(key: Any, low: Any, high: Any, shift: Any, octant: Any) -> Any:
+    """First row from `low` to `high` whose key has an octant of at least `octant` at a level."""
+    while low < high:
+        middle = (low + high) // 2
+        if (key[middle] >> shift) & np.uint64(7) < octant:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @jit
@@ -82,19 +90,24 @@ def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
             shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
         if level == LEVELS or (end - start <= leaf and level >= coarse):
             continue
-        high = end
-        while high > start:
-            octant = key[high - 1] >> shift
-            low, above = start, high - 1
-            while low < above:
-                middle = (low + above) // 2
-                if key[middle] >> shift < octant:
-                    low = middle + 1
-                else:
-                    above = middle
-            stack[depth, 0], stack[depth, 1], stack[depth, 2] = low, high, level + 1
-            depth += 1
-            high = low
+        # From the last octant to the first, so that the first child is the next to be taken.
+        most = leaf if level + 1 >= coarse else FEW
+        high, octant = end, np.uint64(8)
+        while octant > 0:
+            # The widest half, quarter or octant that ends here and has few enough for a leaf.
+            width = np.uint64(4)
+            while True:
+                low = high
+                if octant & (width - np.uint64(1)) == 0:
+                    low = _first_of(key, start, high, shift, octant - width)
+                    if width == 1 or high - low <= most:
+                        break
+                width >>= np.uint64(1)
+            octant -= width
+            if low < high:
+                stack[depth, 0], stack[depth, 1], stack[depth, 2] = low, high, level + 1
+                depth += 1
+                high = low
     for back in range(count):
         cell = count - 1 - back
         after = cell + 1
@@ -125,81 +138,120 @@ def unpermute(sums: Any, order: Any, result: Any, first: Any, last: Any) -> None
 
 
 @jit
-def _summarize(
-    tree: Tree, first: Any, last: Any, table: Tables, bench: Bench, shifted: Any, relative: bool
-) -> None:
-    """Fill the rows of `bodies` and `moments` of cells `first` to `last`, children before parents.
-
-    `shifted` (4, largest leaf) is working memory; `relative`: `tree.near` is from
-    the leaf's center.
-    """
+def _measure(tree: Tree, cell: Any) -> None:
+    """Fill in a cell's body, its children's being there."""
     cells, bodies, place = tree.cells, tree.bodies, tree.place
-    for back in range(last - first):
-        cell = last - 1 - back
-        start, end, skip = cells[cell, START], cells[cell, END], cells[cell, SKIP]
-        is_leaf = skip == cell + 1
-        mass = x = y = z = 0.0
-        weights = LIGHT * (end - start)
-        if is_leaf:
-            for i in range(start, end):
-                m = place[3, i]
-                mass += m
-                m += LIGHT
-                x += m * place[0, i]
-                y += m * place[1, i]
-                z += m * place[2, i]
-        else:
-            child = cell + 1
-            while child < skip:
-                m = bodies[child, MASS]
-                mass += m
-                m += LIGHT * (cells[child, END] - cells[child, START])
-                x += m * bodies[child, X]
-                y += m * bodies[child, Y]
-                z += m * bodies[child, Z]
-                child = cells[child, SKIP]
-        weights += mass
-        x, y, z = x / weights, y / weights, z / weights
-        r2 = 0.0
+    start, end, skip = cells[cell]
+    x = y = z = mass = 0.0
+    weights = LIGHT * (end - start)
+    if skip == cell + 1:
         for i in range(start, end):
-            dx, dy, dz = place[0, i] - x, place[1, i] - y, place[2, i] - z
-            r2 = max(r2, dx * dx + dy * dy + dz * dz)
-        radius = np.sqrt(r2)
-        bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
-        bodies[cell, RADIUS], bodies[cell, MASS] = radius, mass
-        h = cell_unit(radius)
-        if is_leaf:
-            count = end - start
-            for i in range(count):
-                shifted[0, i] = place[0, start + i] - x
-                shifted[1, i] = place[1, start + i] - y
-                shifted[2, i] = place[2, start + i] - z
-                shifted[3, i] = place[3, start + i]
-            for row in range(4):
-                for i in range(count):
-                    tree.near[row, start + i] = (
-                        shifted[row, i] if relative else place[row, start + i]
-                    )
+            m = place[3, i]
+            mass += m
+            m += LIGHT
+            x += m * place[0, i]
+            y += m * place[1, i]
+            z += m * place[2, i]
+    else:
+        child = cell + 1
+        while child < skip:
+            m = bodies[child, MASS]
+            mass += m
+            m += LIGHT * (cells[child, END] - cells[child, START])
+            x += m * bodies[child, X]
+            y += m * bodies[child, Y]
+            z += m * bodies[child, Z]
+            child = cells[child, SKIP]
+    weights += mass
+    x, y, z = x / weights, y / weights, z / weights
+    xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
+    r2 = 0.0
+    for i in range(xs.size):
+        dx, dy, dz = xs[i] - x, ys[i] - y, zs[i] - z
+        r2 = max(r2, dx * dx + dy * dy + dz * dz)
+    bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
+    bodies[cell, RADIUS], bodies[cell, MASS] = np.sqrt(r2), mass
+
+
+@jit
+def _approach(tree: Tree, cell: Any, relative: bool) -> None:
+    """Write a leaf's particles as the pairs see them."""
+    start, end, _ = tree.cells[cell]
+    for axis in range(3):
+        old, new = tree.place[axis, start:end], tree.near[axis, start:end]
+        center = tree.bodies[cell, axis] if relative else 0.0
+        for i in range(old.size):
+            new[i] = old[i] - center
+    old, new = tree.place[3, start:end], tree.near[3, start:end]
+    for i in range(old.size):
+        new[i] = old[i]
+
+
+@cache
+def _summation(order: int, harmonic: bool) -> Callable[..., None]:
+    """Compiled function that fills in bodies, near and moments of cells `first` to `last`.
+
+    (tree, first, last, relative, place, chosen, sums) -> None
+    """
+    operations = translations(order, harmonic)
+    particles_to_moments = operations.particles_to_moments
+    sums_to_moments = operations.sums_to_moments
+    moments_to_moments = operations.moments_to_moments
+
+    @jit
+    def moments_of_leaf(tree: Tree, cell: Any, place: Any, sums: Any) -> None:
+        start, end, _ = tree.cells[cell]
+        body = tree.bodies[cell]
+        scale = 1.0 / cell_unit(body[RADIUS])
+        sums[:] = 0
+        for first in range(start, end, LANES):
+            for lane in range(LANES):
+                i = min(first + lane, end - 1)
+                place[0, lane] = (body[X] - tree.place[0, i]) * scale
+                place[1, lane] = (body[Y] - tree.place[1, i]) * scale
+                place[2, lane] = (body[Z] - tree.place[2, i]) * scale
+                place[3, lane] = tree.place[3, i] if first + lane < end else 0.0
+            particles_to_moments(place, sums)
+        sums_to_moments(sums, tree.moments[cell])
+
+    @jit
+    def moments_of_parent(tree: Tree, cell: Any, place: Any, chosen: Any) -> None:
+        bodies, skip = tree.bodies, tree.cells[cell, SKIP]
+        body = bodies[cell]
+        scale = 1.0 / cell_unit(body[RADIUS])
+        child = cell + 1
+        for lane in range(LANES):
+            chosen[lane] = cell + 1
+            place[3, lane] = 0.0
+            if child < skip:
+                chosen[lane] = child
+                place[0, lane] = (body[X] - bodies[child, X]) * scale
+                place[1, lane] = (body[Y] - bodies[child, Y]) * scale
+                place[2, lane] = (body[Z] - bodies[child, Z]) * scale
+                place[3, lane] = 1.0
+                place[4, lane] = cell_unit(bodies[child, RADIUS]) * scale
+                child = tree.cells[child, SKIP]
+        moments_to_moments(place, chosen, tree.moments, tree.moments[cell])
+
+    @jit
+    def fill(
+        tree: Tree, first: Any, last: Any, relative: bool, place: Any, chosen: Any, sums: Any
+    ) -> None:
+        for back in range(last - first):
+            cell = last - 1 - back
+            is_leaf = tree.cells[cell, SKIP] == cell + 1
+            _measure(tree, cell)
+            if is_leaf:
+                _approach(tree, cell, relative)
             if tree.moments.shape[0] > 0:
-                scale = table.factor.dtype.type(1.0 / h)
-                particles_to_moments(table, bench, shifted, count, scale, tree.moments[cell])
-        elif tree.moments.shape[0] > 0:
-            bench.place[:] = 0
-            child, lane = cell + 1, 0
-            while child < skip:
-                bench.place[0, lane] = (x - bodies[child, X]) / h
-                bench.place[1, lane] = (y - bodies[child, Y]) / h
-                bench.place[2, lane] = (z - bodies[child, Z]) / h
-                bench.place[3, lane] = 1
-                bench.ratio[lane] = cell_unit(bodies[child, RADIUS]) / h
-                for row in range(tree.moments.shape[1]):
-                    bench.moments[row, lane] = tree.moments[child, row]
-                child = cells[child, SKIP]
-                lane += 1
-            moments_to_moments(table, bench, tree.moments[cell])
-        if tree.moments.shape[0] > 0:
-            # Single precision would lose digits of the sum of many equal masses.
-            tree.moments[cell, 0] = mass
+                if is_leaf:
+                    moments_of_leaf(tree, cell, place, sums)
+                else:
+                    moments_of_parent(tree, cell, place, chosen)
+                # Single precision would lose digits of the sum of many equal masses.
+                tree.moments[cell, 0] = tree.bodies[cell, MASS]
+
+    return fill  # type: ignore[no-any-return]
 
 
 @jit(inline=True)
@@ -258,22 +310,22 @@ def _usual_level(key: NDArray[np.uint64], cells: NDArray[np.int32]) -> int:
     return int(level[order[np.searchsorted(share, share[-1] / 2)]])
 
 
-def summarize(tree: Tree, table: Tables, real: type, sources: bool) -> Tree:
+def summarize(tree: Tree, order: int, harmonic: bool, real: type, sources: bool) -> Tree:
     """The tree with bodies, and for `sources` moments, filled in from places and masses."""
     branches, stem = divide_work(tree)
+    operations, fill = translations(order, harmonic), _summation(order, harmonic)
     count = len(tree.cells) if sources else 0
     near: NDArray[Any] = np.empty((4, tree.place.shape[1] + LANES), real)
     near[:, -LANES:] = 0
-    tree = tree._replace(moments=np.zeros((count, len(table.kept)), real), near=near)
-    largest = largest_leaf(tree)
+    tree = tree._replace(moments=np.zeros((count, padded(operations.basis)), real), near=near)
 
-    def fill(first: int, last: int) -> None:
-        shifted: NDArray[Any] = np.empty((4, largest), real)
-        _summarize(tree, first, last, table, bench(table, real), shifted, real is np.float32)
+    def cells(first: int, last: int) -> None:
+        place, sums = np.ones((5, LANES), real), np.empty((operations.every, LANES), real)
+        fill(tree, first, last, real is np.float32, place, np.zeros(LANES, np.int32), sums)
 
-    share(lambda k: fill(branches[k], int(tree.cells[branches[k], SKIP])), len(branches))
+    share(lambda k: cells(branches[k], int(tree.cells[branches[k], SKIP])), len(branches))
     for cell in reversed(stem):
-        fill(cell, cell + 1)
+        cells(cell, cell + 1)
     return tree
 
 

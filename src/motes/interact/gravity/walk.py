@@ -16,15 +16,9 @@ from typing import Any
 import numpy as np
 
 from motes.interact.gravity.desk import Desk, Limits
-from motes.interact.gravity.expansions import Tables
 from motes.interact.gravity.lanes import LANES
 from motes.interact.gravity.near import near_field
-from motes.interact.gravity.translations import (
-    local_to_local,
-    local_to_particles,
-    moments_to_local,
-    unfold,
-)
+from motes.interact.gravity.translations import translations
 from motes.interact.gravity.tree import END, MASS, RADIUS, SKIP, START, Tree, X, Y, Z, cell_unit
 from motes.jit import jit
 
@@ -40,157 +34,163 @@ def _accepts(limits: Limits, allowed: Any, r2: Any, radii: Any, mass: Any, order
     if limits.reach > 0.0 and gap * gap >= r2:
         return False
     r2 += limits.e2
-    ratio2 = radii * radii / r2
-    if not ratio2 < limits.opening2:
+    if not radii * radii < limits.opening2 * r2:
         return False
-    estimate = mass
-    for _ in range(order // 2):
-        estimate *= ratio2
-    if order % 2 == 1:
-        estimate *= np.sqrt(ratio2)
-    rest = 1.0 - ratio2
-    return estimate <= allowed * r2 * (rest * rest)
-
-
-@jit
-def _gather(
-    targets: Tree, sources: Tree, cell: Any, low: Any, high: Any, table: Tables, limits: Limits,
-    desk: Desk,
-) -> Any:  # fmt: skip
-    """Add the local terms of all source cells that are far enough; return the end of the others.
-
-    Candidates are those from `low` to `high`; the rest is written from `high` on. Returns -1 if
-    there is no room.
-    """
-    bench, opened, candidates = desk.bench, desk.opened, desk.candidates
-    place, ratio, gathered = bench.place, bench.ratio, desk.gathered
-    old_moments, new_moments = sources.moments, bench.moments
-    cells, bodies = sources.cells, sources.bodies
-    order, kind = bench.powers.shape[0] - 1, place.dtype.type
-    x, y, z = targets.bodies[cell, X], targets.bodies[cell, Y], targets.bodies[cell, Z]
-    radius = targets.bodies[cell, RADIUS]
-    count = targets.cells[cell, END] - targets.cells[cell, START]
-    is_leaf = targets.cells[cell, SKIP] == cell + 1
-    h, e2 = kind(cell_unit(radius)), kind(limits.e2)
-    allowed = min(limits.error, limits.force / max(targets.bodies[cell, MASS], 1e-300))
-    gathered[:] = 0
-    top, lane = high, 0
-    for k in range(low, high):
-        opened[0] = candidates[k]
-        depth = 1
-        while depth > 0:
-            depth -= 1
-            other = opened[depth]
-            skip, reach = cells[other, SKIP], bodies[other, RADIUS]
-            dx, dy, dz = x - bodies[other, X], y - bodies[other, Y], z - bodies[other, Z]
-            leaves = is_leaf and skip == other + 1
-            r2 = dx * dx + dy * dy + dz * dz
-            far = _accepts(limits, allowed, r2, radius + reach, bodies[other, MASS], order)
-            if far and leaves:
-                number = cells[other, END] - cells[other, START]
-                far = number * count > limits.few
-            if far:
-                place[0, lane] = kind(dx)
-                place[1, lane] = kind(dy)
-                place[2, lane] = kind(dz)
-                place[3, lane] = kind(1)
-                ratio[lane] = kind(cell_unit(reach))
-                for row in range(old_moments.shape[1]):
-                    new_moments[row, lane] = old_moments[other, row]
-                lane += 1
-                if lane == LANES:
-                    moments_to_local(table, bench, h, e2, gathered)
-                    lane = 0
-            elif skip > other + 1 and (is_leaf or reach >= radius):
-                child = other + 1
-                while child < skip:
-                    opened[depth] = child
-                    depth += 1
-                    child = cells[child, SKIP]
-            else:
-                if top == candidates.size:
-                    return -1
-                candidates[top] = other
-                top += 1
-    if lane > 0:
-        for unused in range(lane, LANES):
-            place[0, unused] = ratio[unused] = kind(1)
-            place[1, unused] = place[2, unused] = place[3, unused] = kind(0)
-        moments_to_local(table, bench, h, e2, gathered)
-    return top
-
-
-@jit
-def _wait(
-    targets: Tree, cell: Any, begin: Any, end: Any, low: Any, high: Any, depth: Any, table: Tables,
-    desk: Desk,
-) -> Any:  # fmt: skip
-    """Put a cell's children that own targets from `begin` to `end` on the stack."""
-    bench, cells, bodies = desk.bench, targets.cells, targets.bodies
-    h = cell_unit(bodies[cell, RADIUS])
-    bench.place[:] = 0
-    bench.place[3, :] = 1
-    lane, child = 0, cell + 1
-    while child < cells[cell, SKIP]:
-        if cells[child, START] < end and cells[child, END] > begin:
-            bench.place[0, lane] = (bodies[child, X] - bodies[cell, X]) / h
-            bench.place[1, lane] = (bodies[child, Y] - bodies[cell, Y]) / h
-            bench.place[2, lane] = (bodies[child, Z] - bodies[cell, Z]) / h
-            bench.ratio[lane] = cell_unit(bodies[child, RADIUS]) / h
-            waiting = desk.waiting[depth + lane]
-            waiting[0], waiting[1], waiting[2] = child, low, high
-            lane += 1
-        child = cells[child, SKIP]
-    local_to_local(table, bench, desk.local[depth : depth + lane])
-    return depth + lane
+    # Squared and multiplied by R^(2p): a division or a root would take as long as all else.
+    square, rest = radii * radii, r2 - radii * radii
+    estimate, bound = mass * mass, allowed * allowed * r2
+    for _ in range(order):
+        estimate *= square
+    for _ in range(order - 3):
+        bound *= r2
+    bound *= rest * rest
+    if order < 3:
+        estimate *= r2
+    return estimate <= bound * (rest * rest)
 
 
 @cache
-def walker(law: str, real: type, potential: bool) -> Callable[..., Any]:
+def walker(
+    law: str, real: type, potential: bool, order: int
+) -> Callable[..., Any]:
     """Compiled walk for a pair law, numbers of type `real`, with or without the potential.
 
-    (targets, sources, same, begin, end, table, limits, desk, out) -> int: writes to rows 0 to 2 of
+    (targets, sources, same, begin, end, limits, desk, out) -> int: writes to rows 0 to 2 of
     `out` (4, n) the sums of m s dx, and with `potential` to row 3 those of m w, for particles
     `begin` to `end` of `targets`, which are whole cells. Returns 0, or 1 if the lists of candidates
     need more room. `same`: the two trees are one, and a particle is among its own sources.
     """
     sum_near = near_field(law, real, potential)
+    operations = translations(order, law != "plummer")
+    moments_to_local, local_to_local = operations.moments_to_local, operations.local_to_local
+    lanes_to_local, local_to_particles = operations.lanes_to_local, operations.local_to_particles
+    zero, one = real(0), real(1)
+
+    @jit
+    def gather(
+        targets: Tree, sources: Tree, cell: Any, low: Any, high: Any, limits: Limits, desk: Desk
+    ) -> Any:
+        """Add the local terms of all source cells that are far enough; return the others' end.
+
+        Candidates are those from `low` to `high`; the rest is written from `high` on. Returns -1 if
+        there is no room.
+        """
+        opened, candidates, place, chosen = desk.opened, desk.candidates, desk.place, desk.chosen
+        cells, bodies = sources.cells, sources.bodies
+        x, y, z = targets.bodies[cell, X], targets.bodies[cell, Y], targets.bodies[cell, Z]
+        radius = targets.bodies[cell, RADIUS]
+        count = targets.cells[cell, END] - targets.cells[cell, START]
+        is_leaf = targets.cells[cell, SKIP] == cell + 1
+        h, e2 = real(cell_unit(radius)), real(limits.e2)
+        allowed = min(limits.error, limits.force / max(targets.bodies[cell, MASS], 1e-300))
+        desk.gathered[:] = 0
+        place[3, :] = 1
+        top, lane = high, 0
+        for k in range(low, high):
+            opened[0] = candidates[k]
+            depth = 1
+            while depth > 0:
+                depth -= 1
+                other = opened[depth]
+                skip, reach = cells[other, SKIP], bodies[other, RADIUS]
+                dx, dy, dz = x - bodies[other, X], y - bodies[other, Y], z - bodies[other, Z]
+                leaves = is_leaf and skip == other + 1
+                r2 = dx * dx + dy * dy + dz * dz
+                far = _accepts(limits, allowed, r2, radius + reach, bodies[other, MASS], order)
+                if far and leaves:
+                    number = cells[other, END] - cells[other, START]
+                    far = number * count > limits.few
+                if far:
+                    place[0, lane], place[1, lane], place[2, lane] = real(dx), real(dy), real(dz)
+                    place[4, lane] = real(cell_unit(reach))
+                    chosen[lane] = other
+                    lane += 1
+                    if lane == LANES:
+                        moments_to_local(place, chosen, sources.moments, h, e2, desk.gathered)
+                        lane = 0
+                elif skip > other + 1 and (is_leaf or reach >= radius):
+                    child = other + 1
+                    while child < skip:
+                        opened[depth] = child
+                        depth += 1
+                        child = cells[child, SKIP]
+                else:
+                    if top == candidates.size:
+                        return -1
+                    candidates[top] = other
+                    top += 1
+        if lane > 0:
+            for unused in range(lane, LANES):
+                place[0, unused] = place[4, unused] = one
+                place[1, unused] = place[2, unused] = place[3, unused] = zero
+                chosen[unused] = 0
+            moments_to_local(place, chosen, sources.moments, h, e2, desk.gathered)
+        return top
+
+    @jit
+    def wait(
+        targets: Tree, cell: Any, begin: Any, end: Any, low: Any, high: Any, depth: Any, desk: Desk
+    ) -> Any:
+        """Put a cell's children that own targets from `begin` to `end` on the stack."""
+        place, cells, bodies = desk.place, targets.cells, targets.bodies
+        scale = 1.0 / cell_unit(bodies[cell, RADIUS])
+        lane, child = 0, cell + 1
+        while child < cells[cell, SKIP]:
+            if cells[child, START] < end and cells[child, END] > begin:
+                place[0, lane] = real((bodies[child, X] - bodies[cell, X]) * scale)
+                place[1, lane] = real((bodies[child, Y] - bodies[cell, Y]) * scale)
+                place[2, lane] = real((bodies[child, Z] - bodies[cell, Z]) * scale)
+                place[4, lane] = real(cell_unit(bodies[child, RADIUS]) * scale)
+                waiting = desk.waiting[depth + lane]
+                waiting[0], waiting[1], waiting[2] = child, low, high
+                lane += 1
+            child = cells[child, SKIP]
+        # What unused lanes write lies above the stack; the cell's own terms are read before.
+        local_to_local(place, desk.local[depth], desk.local, depth)
+        return depth + lane
+
+    @jit
+    def finish(targets: Tree, cell: Any, terms: Any, desk: Desk) -> None:
+        """Begin the sums of a leaf with the field of its local terms."""
+        place, out, body = desk.place, desk.gathered, targets.bodies[cell]
+        start, end = targets.cells[cell, START], targets.cells[cell, END]
+        scale = 1.0 / cell_unit(body[RADIUS])
+        for first in range(0, end - start, LANES):
+            for lane in range(LANES):
+                i = min(start + first + lane, end - 1)
+                place[0, lane] = real((targets.place[0, i] - body[X]) * scale)
+                place[1, lane] = real((targets.place[1, i] - body[Y]) * scale)
+                place[2, lane] = real((targets.place[2, i] - body[Z]) * scale)
+            local_to_particles(place, terms, real(scale), out)
+            for lane in range(LANES):
+                for axis in range(3):
+                    desk.total[axis, first + lane] = out[axis, lane]
+                desk.total[4, first + lane] = out[3, lane]
 
     @jit
     def walk(
-        targets: Tree, sources: Tree, same: Any, begin: Any, end: Any, table: Tables,
-        limits: Limits, desk: Desk, out: Any,
+        targets: Tree, sources: Tree, same: Any, begin: Any, end: Any, limits: Limits, desk: Desk,
+        out: Any,
     ) -> Any:  # fmt: skip
-        total, kind = desk.total, desk.total.dtype.type
+        total, waiting = desk.total, desk.waiting
         desk.local[0] = 0
         desk.candidates[0] = 0
-        waiting = desk.waiting
         waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, 0, 1
         depth = 1
         while depth > 0:
             depth -= 1
             cell, low, high = waiting[depth]
-            top = _gather(targets, sources, cell, low, high, table, limits, desk)
+            top = gather(targets, sources, cell, low, high, limits, desk)
             if top < 0:
                 return 1
-            for row in range(table.kept.size):
-                desk.local[depth, row] += desk.gathered[row].sum()
-            unfold(table, desk.local[depth], desk.bench.whole)
+            lanes_to_local(desk.gathered, desk.local[depth])
             if targets.cells[cell, SKIP] > cell + 1:
-                depth = _wait(targets, cell, begin, end, high, top, depth, table, desk)
+                depth = wait(targets, cell, begin, end, high, top, depth, desk)
                 continue
-            start = targets.cells[cell, START]
-            count = targets.cells[cell, END] - start
-            body = targets.bodies[cell]
-            total[:] = 0
-            for i in range(count):
-                desk.part[0, i] = targets.place[0, start + i] - body[X]
-                desk.part[1, i] = targets.place[1, start + i] - body[Y]
-                desk.part[2, i] = targets.place[2, start + i] - body[Z]
-            scale = kind(1.0 / cell_unit(body[RADIUS]))
-            local_to_particles(table, desk.bench, desk.part, count, scale, potential, total)
+            finish(targets, cell, desk.local[depth], desk)
             sum_near(targets, sources, same, cell, desk.candidates[high:top], limits, desk)
-            for i in range(count):
+            start = targets.cells[cell, START]
+            for i in range(targets.cells[cell, END] - start):
                 out[0, start + i] = total[0, i]
                 out[1, start + i] = total[1, i]
                 out[2, start + i] = total[2, i]

@@ -1,0 +1,202 @@
+"""Straight-line machine code from a formula in Python.
+
+A formula reads and writes arrays at places that Python knows, in loops over lists of terms. Traced,
+it runs once, with values of LLVM for numbers, and what it did becomes the code of one operation
+without loops, whose values stay in registers. Called on NumPy arrays, it does the same slowly.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numba
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic
+
+from motes.interact.gravity import lanes as simd
+from motes.interact.gravity.lanes import LANES
+
+
+def traced(formula: Callable[..., None]) -> Callable[..., None]:
+    """An operation for kernels, from a formula of arrays and numbers.
+
+    A two-dimensional array is seen as rows of LANES numbers, `rows[k]`, a one-dimensional one as
+    numbers. Both may be assigned to. With lanes, a number is that number in each lane.
+    """
+    if numba.config.DISABLE_JIT:
+        return formula
+
+    def operation(typing: Any, *arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            formula(*(_wire(context, builder, *pair) for pair in zip(sig.args, args, strict=True)))
+            return context.get_dummy_value()
+
+        return types.void(*arguments), generate
+
+    given = inspect.signature(formula).parameters.values()
+    first = inspect.Parameter("typing", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    operation.__signature__ = inspect.Signature([first, *given])  # type: ignore[attr-defined]
+    operation.__name__ = formula.__name__
+    return intrinsic(operation)  # type: ignore[no-any-return]
+
+
+FLAGS = ("contract",)
+"""Multiply-adds may be fused; the order of sums stands, as the compiler knows no better one."""
+
+
+class Wire:
+    """Lanes, or a number, in a formula that is traced."""
+
+    def __init__(self, builder: Any, value: Any) -> None:
+        self.builder, self.value = builder, value
+
+    def _with(self, other: Any, operation: Callable[[Any, Any], Any]) -> Wire:
+        a, b = self.value, other.value if isinstance(other, Wire) else other
+        if not isinstance(other, Wire):
+            wide = isinstance(a.type, ir.VectorType)
+            b = simd.constant(a.type.element, b) if wide else ir.Constant(a.type, b)
+        elif a.type != b.type:
+            a, b = (
+                v if isinstance(v.type, ir.VectorType) else simd.splat(self.builder, v)
+                for v in (a, b)
+            )
+        return Wire(self.builder, operation(a, b, flags=FLAGS))
+
+    def __add__(self, other: Any) -> Wire:
+        return self._with(other, self.builder.fadd)
+
+    def __sub__(self, other: Any) -> Wire:
+        return self._with(other, self.builder.fsub)
+
+    def __mul__(self, other: Any) -> Wire:
+        return self._with(other, self.builder.fmul)
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> Wire:
+        return self * -1.0
+
+
+class _Array:
+    """An array in a formula: where it is, and its strides [elements]."""
+
+    def __init__(self, context: Any, builder: Any, kind: Any, value: Any) -> None:
+        array = context.make_array(kind)(context, builder, value)
+        self.builder, self.data = builder, array.data
+        self.element = context.get_value_type(kind.dtype)
+        self.align = context.get_abi_sizeof(self.element)
+        self.width = builder.extract_value(array.shape, 1) if kind.ndim == 2 else None
+
+    def pointer(self, place: Any, wide: bool) -> Any:
+        found = self.builder.gep(self.data, [place])
+        if not wide:
+            return found
+        return self.builder.bitcast(found, ir.VectorType(self.element, LANES).as_pointer())
+
+    def lanes(self, place: Any) -> Wire:
+        return Wire(self.builder, self.builder.load(self.pointer(place, True), align=self.align))
+
+    def number(self, place: Any) -> Any:
+        return self.builder.load(self.pointer(place, False))
+
+
+class _Rows(_Array):
+    def __getitem__(self, row: int) -> Wire:
+        return self.lanes(_index(row * LANES))
+
+    def __setitem__(self, row: int, lanes: Wire) -> None:
+        pointer = self.pointer(_index(row * LANES), True)
+        self.builder.store(lanes.value, pointer, align=self.align)
+
+
+class _Terms(_Array):
+    def __getitem__(self, k: int) -> Wire:
+        return Wire(self.builder, self.number(_index(k)))
+
+    def __setitem__(self, k: int, number: Wire) -> None:
+        self.builder.store(number.value, self.pointer(_index(k), False))
+
+
+def _wire(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    if isinstance(kind, types.Array):
+        return (_Rows if kind.ndim == 2 else _Terms)(context, builder, kind, value)
+    if isinstance(kind, types.Integer):
+        return builder.sext(value, ir.IntType(64)) if value.type.width < 64 else value
+    return Wire(builder, value)
+
+
+def _index(k: int) -> Any:
+    return ir.Constant(ir.IntType(64), k)
+
+
+def inverse_root(lanes: Any) -> Any:
+    """1 / root of each lane."""
+    if not isinstance(lanes, Wire):
+        return lanes.dtype.type(1) / np.sqrt(lanes)
+    one = simd.constant(lanes.value.type.element, 1.0)
+    root = simd.square_root(lanes.builder, lanes.value)
+    return Wire(lanes.builder, lanes.builder.fdiv(one, root))
+
+
+def ones(like: Any) -> Any:
+    """1 in each lane."""
+    if not isinstance(like, Wire):
+        return np.ones_like(like)
+    return Wire(like.builder, simd.constant(like.value.type.element, 1.0))
+
+
+def total(lanes: Any) -> Any:
+    """Sum over the lanes, a number."""
+    if not isinstance(lanes, Wire):
+        return lanes.sum()
+    return Wire(lanes.builder, simd.added(lanes.builder, lanes.value))
+
+
+def gathered(table: Any, chosen: Any, count: int) -> Sequence[Any]:
+    """The first `count` columns of a table, lane k from row chosen[k]; its width fills lanes."""
+    if not isinstance(table, _Array):
+        return [table[chosen, column].copy() for column in range(count)]
+    columns: list[Any] = []
+    builder, long = table.builder, ir.IntType(64)
+    rows = [
+        builder.mul(builder.sext(chosen.number(_index(lane)), long), table.width)
+        for lane in range(LANES)
+    ]
+    for first in range(0, count, LANES):
+        block = [table.lanes(builder.add(row, _index(first))).value for row in rows]
+        columns += [Wire(builder, column) for column in _transposed(builder, block)]
+    return columns[:count]
+
+
+def scattered(columns: Sequence[Any], table: Any, first: Any) -> None:
+    """Write lane k of all columns to row `first` + k of a table, whose width fills lanes."""
+    if not isinstance(table, _Array):
+        for column, values in enumerate(columns):
+            table[first : first + LANES, column] = values
+        return
+    builder = table.builder
+    values = [column.value for column in columns]
+    values += [values[-1]] * (-len(values) % LANES)
+    for begin in range(0, len(values), LANES):
+        for lane, row in enumerate(_transposed(builder, values[begin : begin + LANES])):
+            place = builder.mul(builder.add(first, _index(lane)), table.width)
+            pointer = table.pointer(builder.add(place, _index(begin)), True)
+            builder.store(row, pointer, align=table.align)
+
+
+def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
+    """A square of LANES vectors, in log2(LANES) rounds that interleave the halves."""
+    half = LANES // 2
+    low = [v for k in range(half) for v in (k, k + LANES)]
+    high = [v + half for v in low]
+    for _ in range(LANES.bit_length() - 1):
+        rows = [
+            simd.shuffle(builder, rows[k], rows[k + half], places)
+            for k in range(half)
+            for places in (low, high)
+        ]
+    return rows
