@@ -77,7 +77,9 @@ class Swarm:
             if not acting or not cells[target].row.size:
                 continue
             n = cells[target].row.size
-            sums = {id(law): np.zeros((law.sums(), n), self.real) for law, _, _ in acting}
+            sums: dict[int, Array] = {}
+            for law, _, _ in acting:
+                sums[id(law)] = np.zeros((law.sums(), n), self.real)
             for source in sources:
                 felt = [law for law, _, names in acting if source in names]
                 part = self._gather(felt, target, source, cells, cut, bodies, packed, time)
