@@ -49,7 +49,7 @@ def _describe(value: Any, names: tuple[str, ...], seen: frozenset[int]) -> str:
     if isinstance(value, types.FunctionType):
         return fingerprint(value, seen)
     if isinstance(written := getattr(value, "_defn", None), types.FunctionType):
-        return fingerprint(written, seen)  # What writes the instructions of one of Numba's intrinsics.
+        return fingerprint(written, seen)  # What writes one of Numba's intrinsics.
     if isinstance(value, np.ndarray):
         return hashlib.sha256(value.tobytes()).hexdigest() + str(value.dtype)
     if isinstance(value, types.ModuleType):
