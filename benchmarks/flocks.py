@@ -153,7 +153,7 @@ def main() -> None:
     options = parser.parse_args()
     n = 200_000 if options.quick else 1_000_000
     report = Report("Flocks and crowds", machine=machine(("scipy",)))
-    report.figures["motes, boids"] = (ours(n, 4.0 if options.quick else 15.0), "M boid-steps/s")
+    report.figures["motes, boids"] = (ours(n, 3.0 if options.quick else 8.0), "M boid-steps/s")
     try:
         report.figures["NumPy and cKDTree"] = (plain(n), "M boid-steps/s")
     except ImportError:

@@ -58,8 +58,8 @@ def inner_loop() -> float:
     attract = attraction("newton", np.float32, False)
     target, source = (rng.random((rows, 1024), np.float32) for rows in (3, 4))
     total, size = np.zeros((5, 1024), np.float32), np.float32(0)
-    columns = [source[row] for row in (0, 1, 2, 3, 3)]
-    return 1024**2 / best(lambda: attract(target, 1024, *columns, size, size, total), 50) / 1e9
+    task = lambda: attract(target, 1024, source, 1024, (0, 0, 0), size, total)  # noqa: E731
+    return 1024**2 / best(task, 50) / 1e9
 
 
 def direct(report: Report, n: int) -> None:

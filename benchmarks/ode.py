@@ -87,11 +87,68 @@ def one_system(report: Report, quick: bool) -> None:
     report.figures["evaluations, motes"] = (ours.evaluations, "")
     report.figures["evaluations, SciPy"] = (theirs, "")
     report.ratio("evaluations, motes", "evaluations, SciPy")
+    report.figures["evaluations at equal error, motes / SciPy"] = (_at_equal_error(), "")
     if importlib.util.find_spec("diffrax"):
         from _peer_diffrax import pleiades as peer
 
         report.figures["Pleiades, diffrax"] = (peer(START, TOLERANCE) * 1e3, "ms")
         report.ratio("Pleiades, diffrax", "Pleiades, motes")
+
+
+def _at_equal_error() -> float:
+    """Largest ratio of evaluations, over errors that both reach between rtol 1e-5 and 1e-11."""
+    from scipy.integrate import solve_ivp
+
+    exact = ode.solve(pleiades, START, (0, 3), method="verner9", rtol=1e-14, atol=1e-15).y[-1]
+    fits, errors = [], []
+    for solve in (
+        lambda tol: ode.solve(pleiades, START, (0, 3), method="dop853", rtol=tol, atol=tol),
+        lambda tol: solve_ivp(pleiades, (0, 3), START, method="DOP853", rtol=tol, atol=tol),
+    ):
+        found = [solve(10.0**-k) for k in np.arange(5, 11.01, 0.5)]
+        ends = [r.y[-1] if hasattr(r, "evaluations") else r.y[:, -1] for r in found]
+        work = [r.evaluations if hasattr(r, "evaluations") else r.nfev for r in found]
+        errors.append(np.log([np.abs(end - exact).max() for end in ends]))
+        fits.append(np.polyfit(errors[-1], np.log(work), 2))
+    low, high = max(e.min() for e in errors), min(e.max() for e in errors)
+    at = np.linspace(low, high, 20)
+    return float(np.exp(np.polyval(fits[0], at) - np.polyval(fits[1], at)).max())
+
+
+def krylov(report: Report) -> None:
+    """One linear solve of a backward Euler step of heat on 400 points: ours, and SciPy's GMRES."""
+    from scipy.sparse.linalg import LinearOperator, gmres
+
+    n, h = 400, 1e-3
+
+    def heat(t, y):
+        wide = np.concatenate([[0.0], y, [0.0]])
+        return n * n * (wide[2:] - 2 * y + wide[:-2])
+
+    y = np.sin(np.pi * np.arange(1, n + 1) / (n + 1)) + 0.1 * np.arange(n) / n
+    options = {"method": "backward_euler", "step": h, "newton": ode.Newton(solver="krylov")}
+    report.figures["Krylov step, motes"] = (
+        best(lambda: ode.solve(heat, y, (0, h), **options), 5) * 1e3,
+        "ms",
+    )
+
+    def scipy() -> None:
+        k, start = heat(0.0, y), heat(0.0, y)
+        size = np.sqrt(np.finfo(float).eps * (1 + np.linalg.norm(y)))
+
+        def apply(v):
+            e = size / max(np.linalg.norm(v), 1e-300)
+            return v - h * (heat(0.0, y + e * v) - start) / e
+
+        operator = LinearOperator((n, n), apply)
+        for _ in range(12):
+            change = gmres(operator, heat(h, y + h * k) - k, rtol=1e-6, restart=60, maxiter=1)[0]
+            k = k + change
+            if h * np.abs(change).max() <= 1e-13:
+                break
+
+    report.figures["Krylov step, SciPy's GMRES"] = (best(scipy, 5) * 1e3, "ms")
+    report.ratio("Krylov step, SciPy's GMRES", "Krylov step, motes")
 
 
 def many_systems(report: Report, quick: bool) -> None:
@@ -145,6 +202,7 @@ def main() -> None:
         machine=machine(("scipy", "diffrax", "jax", "numbalsoda")),
     )
     one_system(report, given.quick)
+    krylov(report)
     many_systems(report, given.quick)
     for peer in ("diffrax", "numbalsoda"):
         if importlib.util.find_spec(peer) is None:

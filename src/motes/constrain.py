@@ -129,17 +129,10 @@ class Constraints:
             return self.ground.walls(time, position, radius, horizon, reach)
 
         for _, law in self.laws:
-            everybody = [
-                Walkers(
-                    name,
-                    m.y[:3, : m.alive],
-                    before[name],
-                    m.y[3:, : m.alive],
-                    _size(m, time),
-                    walls,
-                )  # fmt: skip
-                for name, m in members.items()
-            ]
+            everybody = []
+            for name, m in members.items():
+                x, v = m.y[:3, : m.alive], m.y[3:, : m.alive]
+                everybody.append(Walkers(name, x, before[name], v, _size(m, time), walls))
             chosen = partners(law, everybody)
             velocities = type(law).kernel("velocities")
             assert velocities is not None

@@ -6,7 +6,8 @@ momentum and order. Here each stage is evaluated for the whole group before the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
@@ -17,19 +18,23 @@ from numpy.typing import NDArray
 
 from motes.capture import Captures
 from motes.catalog import Component
+from motes.compile import implicit
 from motes.compile.pairs import Law
 from motes.compile.staged import combine
 from motes.constrain import Constraints, Ground
-from motes.errors import SceneError, likely
+from motes.errors import SceneError, SimulationError, likely
 from motes.interact.arrange import Box
 from motes.jit import blocks, share
 from motes.nearby import Body, Lasting, Nearby
 from motes.state import Particles
 from motes.step import Interval, Stepper
-from motes.tableau import Explicit, Splitting
+from motes.tableau import Explicit, Implicit, Splitting
 
 BLOCK = 1 << 14
 """Rows of one kernel call."""
+
+ROUNDED = 1e3
+"""Roundings that an implicit stage of a group may still be off where its iteration ended."""
 
 Interactions = tuple[tuple[str, Component], ...]
 
@@ -157,6 +162,8 @@ class Group:
         members = {name: self._member(name, systems[name], alive[name]) for name in alive}
         if isinstance(self.method, Splitting):
             self._split(members, interval, self.method, memory)
+        elif isinstance(self.method, Implicit):
+            self._implicit(members, interval, self.method, memory)
         else:
             self._runge_kutta(members, interval, self.method, memory)
         for name, stepper in self.steppers.items():
@@ -218,12 +225,7 @@ class Group:
         bases = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
         slopes = {name: np.zeros((s, 6, m.alive), m.y.dtype) for name, m in members.items()}
         for i, row in enumerate((*method.a, method.b)):
-            weights = np.array(row, float)
-            for name, member in members.items():
-                parts = blocks(member.alive, BLOCK)
-                real = member.y.dtype.type
-                arguments = (bases[name], slopes[name], weights.astype(real), real(h), member.y)
-                share(lambda k, a=arguments, p=parts: combine(*a, *p[k]), len(parts))  # type: ignore[misc]
+            _combine(members, bases, slopes, row, h)
             memory.push = None
             if i == s:
                 return
@@ -231,6 +233,51 @@ class Group:
             self._interact(members, time, memory)
             for name, member in members.items():
                 member.each("slope", slopes[name][i], member.K, time)
+
+    def _implicit(
+        self, members: dict[str, _Member], interval: Interval, method: Implicit, memory: Lasting
+    ) -> None:
+        """Stages one by one; each row's own forces by Newton's method, pushes by iteration.
+
+        That converges where h^2 times the stiffness between particles stays below 1; forces of
+        one particle alone, and damping, may be as stiff as they like.
+        """
+        h = interval.length
+        bases = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
+        places = implicit.stages(method)
+        slopes = {n: np.zeros((len(places), 6, m.alive), m.y.dtype) for n, m in members.items()}
+        for place, i in enumerate(places):
+            _combine(members, bases, slopes, [method.a[i][j] for j in places[:place]], h)
+            memory.push = None
+            time, g = _at(interval, method.c[i]), method.a[i][i] * h
+            if not g:
+                self._interact(members, time, memory)
+                for name, member in members.items():
+                    member.each("slope", slopes[name][place], member.K, time)
+                continue
+            known = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
+            last = math.inf
+            for _ in range(implicit.ITERATIONS):
+                before = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
+                self._interact(members, time, memory)
+                memory.push = None
+                for name, member in members.items():
+                    member.each("settled", known[name], member.K, time, g)
+                change = max(
+                    _change(m.y[:, : m.alive], before[name]) for name, m in members.items()
+                )
+                if change <= 1 or not change < last:
+                    break
+                last = change
+            if not change <= ROUNDED:
+                raise SimulationError(
+                    f"the equations of a step at t = {interval.begin:.6g} s have no solution: the "
+                    f"interaction is too stiff for its length, {h:g} s. Try a smaller step."
+                )
+            for name, m in members.items():
+                slopes[name][place] = (m.y[:, : m.alive] - known[name]) / m.y.dtype.type(g)
+        _combine(members, bases, slopes, [method.b[i] for i in places], h)
+        memory.push = None
 
     def _interact(self, members: dict[str, _Member], time: float, memory: Lasting) -> None:
         """Give every member the push of the interactions at a time.
@@ -327,6 +374,32 @@ def named_systems(interaction: Component) -> set[str]:
     others = (interaction.values[key].document() for key in ("sources", "hunters")
               if key in interaction.values)  # fmt: skip
     return named.union(*others) if named else named
+
+
+def _combine(
+    members: dict[str, _Member],
+    bases: dict[str, NDArray[Any]],
+    slopes: dict[str, NDArray[Any]],
+    weights: Sequence[float],
+    h: float,
+) -> None:
+    """Every member's state becomes base + h sum_j weights_j slopes_j."""
+    for name, member in members.items():
+        parts, real = blocks(member.alive, BLOCK), member.y.dtype.type
+        row = np.array(weights, float).astype(real)
+        arguments = (bases[name], slopes[name], row, real(h), member.y)
+        share(lambda k, a=arguments, p=parts: combine(*a, *p[k]), len(parts))  # type: ignore[misc]
+
+
+def _change(state: NDArray[Any], before: NDArray[Any]) -> float:
+    """Largest change of positions and of velocities, in roundings of their largest number."""
+    result = 0.0
+    for block, old in ((state[:3], before[:3]), (state[3:], before[3:])):
+        size = float(np.abs(block).max(initial=0.0)) * float(np.finfo(state.dtype).eps)
+        moved = float(np.abs(block - old).max(initial=0.0))
+        if moved:
+            result = max(result, moved / size)
+    return result if np.isfinite(state).all() else math.inf
 
 
 def _kernel(interaction: Component, name: str) -> Callable[..., Any]:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from motes.renderer import Picture
     from motes.scene import Scene
     from motes.simulation import Simulation
 
@@ -34,6 +35,9 @@ FRAMES = "frames"
 
 STILLS = 6
 """Stills on a contact sheet."""
+
+HELD = 1 << 28
+"""Most memory of frames that wait until the first still is drawn [bytes]."""
 
 WAITING = 3
 """Frames that may wait for the disk and the encoder; more would only use memory."""
@@ -89,8 +93,7 @@ def film(
             frames = _kept(simulation, numbers, store, follower, report)
             if draw:
                 path = Path(folder) / f"{name}.{form}"
-                frames = _after(frames, rehearsal)
-                sheet = _draw(frames, numbers, scene, path, follower, report)
+                sheet = _draw(frames, numbers, scene, path, follower, report, rehearsal)
                 return Made(path, sheet, store.folder)
             for _ in frames:
                 report.finished()
@@ -173,24 +176,13 @@ def _kept(
 ) -> Iterator[Frame]:
     """Frames of a simulation, each on its way to the store before anybody draws it."""
     frames = simulation.frames(first=numbers[0], last=numbers[-1])
+    interacts = bool(store.manifest.scene.get("interact"))
     for frame in report.simulated(frames, simulation):
         follower.add(store.write, frame)
+        if interacts:
+            # Of the last whole step before the frame, whose time they state.
+            store.note(frame.index, simulation.measure())
         yield frame
-
-
-def _after(frames: Iterator[Frame], rehearsal: Rehearsal) -> Iterator[Frame]:
-    """Frames, none of them before the first particles are there and the rehearsal is over.
-
-    So this process compiles what simulates, and never what the other one is compiling.
-    """
-    empty = []
-    for frame in frames:
-        empty.append(frame)
-        if frame.count:
-            break
-    rehearsal.wait()
-    yield from empty
-    yield from frames
 
 
 def _draw(
@@ -200,6 +192,7 @@ def _draw(
     path: Path,
     follower: _Follower,
     report: Report,
+    rehearsal: Rehearsal | None = None,
 ) -> Path:
     """Draw frames into a film at `path`; gives its contact sheet, until then the first still."""
     from motes.renderer import Video, contact_sheet
@@ -211,19 +204,53 @@ def _draw(
     stills: list[NDArray[np.uint8]] = []
     times: list[float] = []
     make_folder(path.parent)
+
+    def show(picture: Picture) -> None:
+        picture.save(sheet)
+        report.still(sheet)
+
     with Video(path, fps=scene.film.fps) as video, follower.emptied():
-        for frame in frames:
-            picture = studio.draw(frame)
+        frames = iter(frames)
+        ahead = _ahead(frames, min(chosen))
+        if rehearsal is not None:
+            # By now this process has compiled what simulates; it compiles nothing twice.
+            rehearsal.wait()
+        for frame, picture in _pictures(ahead, frames, studio.draw, show):
             follower.add(video.write, picture.pixels)
             if frame.index in chosen:
-                if not stills:
-                    picture.save(sheet)
-                    report.still(sheet)
                 stills.append(picture.pixels)
                 times.append(frame.time)
             report.finished()
     contact_sheet(stills, times, sheet)
     return sheet
+
+
+def _ahead(frames: Iterable[Frame], still: int) -> list[Frame]:
+    """The frames up to the first still, or as many as may wait in memory."""
+    held: list[Frame] = []
+    room = HELD
+    for frame in frames:
+        held.append(frame)
+        room -= sum(a.nbytes for columns in frame.systems.values() for a in columns.values())
+        if frame.index >= still or room < 0:
+            break
+    return held
+
+
+def _pictures(
+    ahead: list[Frame],
+    frames: Iterable[Frame],
+    draw: Callable[[Frame], Picture],
+    show: Callable[[Picture], None],
+) -> Iterator[tuple[Frame, Picture]]:
+    """Frames with their pictures, in order; the last one of `ahead` is drawn and shown first."""
+    early = draw(ahead[-1])
+    show(early)
+    for frame in ahead[:-1]:
+        yield frame, draw(frame)
+    yield ahead[-1], early
+    for frame in frames:
+        yield frame, draw(frame)
 
 
 class _Follower:

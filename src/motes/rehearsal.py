@@ -22,6 +22,9 @@ from motes.frame import Frame
 if TYPE_CHECKING:
     from motes.scene import Scene
 
+SIZE = (96, 54)
+"""Size of that picture: its kernels are those of a large one."""
+
 LONGEST = 60.0
 """Time after which nobody waits any longer [s]."""
 
@@ -96,8 +99,9 @@ def main() -> None:
     from motes.studio import Studio
 
     scene = from_document(json.load(sys.stdin))
-    _ = Studio(scene).draw(frame_of(scene)).pixels
+    _ = Studio(scene, size=SIZE).draw(frame_of(scene)).pixels
 
 
 if __name__ == "__main__":
     main()
+    os._exit(0)  # Nobody needs to clean up, which would take as long as a kernel.

@@ -18,7 +18,7 @@ from motes.compile.straight import THREATENED
 from motes.compile.system import CompiledSystem
 from motes.emission import Clock, Source
 from motes.errors import SceneError
-from motes.jit import blocks, share
+from motes.jit import blocks, bound, share
 from motes.state import Particles
 
 LARGEST_BLOCK = 1 << 18
@@ -154,12 +154,14 @@ class Stepper:
         parts = _parts(last - first, 1)
         found = [NOTHING] * len(parts)
 
+        step = bound(
+            kernel, rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
+            interval.begin, interval.end,
+        )  # fmt: skip
+
         def straight(k: int) -> None:
             low, high = first + parts[k][0], first + parts[k][1]
-            kernel(
-                rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
-                interval.begin, interval.end, low, high,
-            )  # fmt: skip
+            step(low, high)
             if self.system.surfaces is not None:
                 found[k] = _marked(flags, low, high)
 

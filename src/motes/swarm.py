@@ -76,8 +76,10 @@ class Swarm:
             sources = sorted({name for _, _, names in acting for name in names})
             if not acting or not cells[target].row.size:
                 continue
-            sums: dict[int, Array] = {id(law): np.zeros((law.sums(), cells[target].row.size), self.real)
-                    for law, _, _ in acting}  # fmt: skip
+            n = cells[target].row.size
+            sums: dict[int, Array] = {}
+            for law, _, _ in acting:
+                sums[id(law)] = np.zeros((law.sums(), n), self.real)
             for source in sources:
                 felt = [law for law, _, names in acting if source in names]
                 part = self._gather(felt, target, source, cells, cut, bodies, packed, time)

@@ -307,10 +307,10 @@ class BackwardDifference:
             _check("", self.order, m, self.a, powers, float(m == 1))
 
 
-Method = Explicit | Splitting
-"""Tables that scenes can be compiled with."""
+Method = Explicit | Splitting | Implicit
+"""Tables that scenes can be compiled with; of implicit ones, those solved stage by stage."""
 
-Table = Method | Implicit | Rosenbrock | Nystrom | BackwardDifference
+Table = Method | Rosenbrock | Nystrom | BackwardDifference
 """All tables, for `motes.ode`."""
 
 

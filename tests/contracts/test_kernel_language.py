@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import typeof
-from numba.core.caching import NullCache
 
 import motes
 from motes.catalog import Component, catalog
@@ -22,9 +20,11 @@ from motes.jit import jit
 from motes.kernel import kernel
 from motes.kernel.language import Translation
 
-RESULTS = {"acceleration": 3, "velocity": 3, "relaxation": 4, "distance": 1, "dies": 1}
+RESULTS = {
+    "acceleration": 3, "velocity": 3, "relaxation": 4, "limited": 3, "distance": 1, "dies": 1,
+}  # fmt: skip
 STATE = ("x", "y", "z", "vx", "vy", "vz")
-WIDTHS = {"color": 4}
+WIDTHS = {"color": 4, "obstacle": 4}
 
 CASES = [
     (component, name)
@@ -41,6 +41,8 @@ def shifted(component: type[Component]) -> Component:
     values: dict[str, Any] = {}
     for key in component.own:
         default = component().values[key]
+        if default.scope == "birth":  # A draw, of which a kernel sees one number.
+            values[key] = 0.4
         if default.scope == "scene":
             moved = [float(v) + 0.25 for v in default.bounds()[:1]] * default.width
             value = moved if len(moved) > 1 else moved[0]
@@ -61,6 +63,7 @@ def machine_code(component: Component, name: str) -> str:
         fields[wide] = f"({', '.join([fields[wide]] * WIDTHS[wide])})"
     place = "X[0][i], X[1][i], X[2][i]"
     arguments = place if name == "distance" else f"{text.record('Q', fields)}, t"
+    arguments += f", {place}" if name == "limited" else ""
     call = text.call(component, "it", name, arguments).source
     total = " + ".join(f"r[{k}]" for k in range(RESULTS[name])) if RESULTS[name] > 1 else "r"
     text.add(text.values.scene_text())
@@ -69,14 +72,12 @@ def machine_code(component: Component, name: str) -> str:
         f"    for i in range(out.size):\n        r = {call}\n        out[i] = {total}\n"
     )
     loop = jit(text.module()["loop"])
-    loop._cache = NullCache()  # What comes from the cache cannot be looked into.
     constants, *others = text.values.arrays(np.float32)
     X = tuple(np.linspace(0.1, 1.0, 64, dtype=np.float32) for _ in columns)
     K = (constants.astype(np.float32), *others)
-    loop.compile(tuple(map(typeof, (X, np.empty(64, np.float32), K, np.float32(0.5)))))
-    functions = re.findall(r"^define .*?^}", loop.inspect_llvm(loop.signatures[0]), re.M | re.S)
-    heads = {f: f.split("\n")[0] for f in functions}
-    return "\n".join(f for f, head in heads.items() if "loop" in head and "cpython" not in head)
+    code = loop.llvm(X, np.empty(64, np.float32), K, np.float32(0.5))
+    (function,) = re.findall(r"^define internal [^\n]*@loop.*?^}", code, re.M | re.S)
+    return function
 
 
 @pytest.mark.parametrize(("component", "name"), CASES, ids=NAMES)
@@ -101,11 +102,13 @@ def test_a_kernel_runs_uncompiled(component: type[Component], name: str) -> None
             self.__dict__.update(values)
 
     values = {key: getattr(component(), key) for key in component.own}
+    values = {key: 0.4 if isinstance(value, dict) else value for key, value in values.items()}
     function = component.kernel(name)
     assert function is not None
     column = {need: [0.5] * WIDTHS[need] if need in WIDTHS else 0.5 for need in component.needs}
     q = Fields(**dict.fromkeys(STATE, 0.5), **column)
     place = (0.5, 0.6, 0.7) if name == "distance" else (q, 0.25)
+    place += (0.1, 0.2, 0.3) if name == "limited" else ()
     assert np.isfinite(function(Fields(**values), *place)).all()
 
 

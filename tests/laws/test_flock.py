@@ -147,7 +147,7 @@ def order_of(noise: float) -> float:
 
 
 def test_the_order_falls_with_noise() -> None:
-    """Vicsek et al., Physical Review Letters 75 (1995) 1226: order at weak noise, none at strong."""
+    """Order at weak noise, none at strong: Vicsek et al., Phys. Rev. Letters 75 (1995) 1226."""
     weak, middle, strong = (order_of(noise) for noise in (0.5, 10.0, 60.0))
     assert weak > 0.98
     assert weak > middle > strong

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import motes
+from motes.production import film, open_frames
 
 
 def simulation(*systems: motes.System, **settings: Any) -> motes.Simulation:
@@ -66,6 +67,47 @@ def test_tracers_are_pulled_and_do_not_pull() -> None:
     lost = simulation(tracer, sun, interact=[motes.interact.Gravity(sources=["moon"])])
     with pytest.raises(motes.SceneError, match='source "moon" does not take part'):
         lost.run(steps=1)
+
+
+def test_a_tolerance_keeps_the_motion_of_direct_sums() -> None:
+    """Accelerations within 1e-4 move stars from rest by at most that times a t^2 / 2, rms."""
+
+    def stars(tolerance: float) -> np.ndarray:
+        emitter = motes.emit.Sphere(burst=[{"count": 3000}], radius=1.0)
+        law = motes.interact.Gravity(G=1.0, softening=0.05, tolerance=tolerance)
+        sim = simulation(
+            motes.System("stars", emit=[emitter], mass=1 / 3000), interact=[law], step=0.05
+        )
+        sim.run(steps=1)
+        sim.run(steps=4)
+        return np.array(sim["stars"].position)
+
+    exact = stars(0.0)
+    close, rough = (np.sqrt(((stars(t) - exact) ** 2).sum(axis=1).mean()) for t in (1e-4, 1e-2))
+    assert close <= 1e-4 * 0.25**2 / 2
+    assert close < rough
+
+
+def test_measures_are_kept_beside_the_frames(tmp_path: Any) -> None:
+    """What `measure` says of the last step before each frame, exactly."""
+    scene = motes.Scene(
+        systems=[
+            body("light", 1.0, (1, 0, 0), (0, 1, 0)),
+            body("heavy", 3.0, (-1, 0, 0), (0, 0, 0)),
+        ],
+        interact=[motes.interact.Gravity(G=1.0)],
+        precision="double", integrator="leapfrog", step=1 / 24, duration=0.25,
+    )  # fmt: skip
+    film(scene, tmp_path, draw=False)
+    kept = open_frames(tmp_path).measures()
+    sim = motes.Simulation(scene)
+    for frame in sim.frames():
+        now = sim.measure()
+        assert kept[frame.index].energy == now.energy
+        assert kept[frame.index].time == now.time
+        assert np.array_equal(kept[frame.index].momentum, now.momentum)
+    assert len(kept) == sim.frame_count
+    assert now.energy == pytest.approx(0.5 - 3 / 2, rel=1e-3)
 
 
 def test_energy_of_forces_with_a_potential() -> None:

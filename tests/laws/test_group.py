@@ -47,7 +47,10 @@ def pair(integrator: str, step: float, **changes: Any) -> motes.Simulation:
     return motes.Simulation(motes.Scene(systems=systems, interact=[Pull()], **settings))
 
 
-ORDERS = {"euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "leapfrog": 2, "heun": 2, "rk4": 4}
+ORDERS = {
+    "euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "leapfrog": 2, "heun": 2, "rk4": 4,
+    "implicit_midpoint": 2, "kencarp4": 4,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("integrator", "order"), ORDERS.items())

@@ -34,7 +34,10 @@ def keys(*pairs: tuple[float, object]) -> dict:
     return {"over": "time", "keys": [list(p) for p in pairs], "interpolation": "smooth"}
 
 
-ORDERS = {"euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "heun": 2, "leapfrog": 2, "rk4": 4}
+ORDERS = {
+    "euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "heun": 2, "leapfrog": 2, "rk4": 4,
+    "backward_euler": 1, "trapezoid": 2,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("integrator", "order"), ORDERS.items())
@@ -164,6 +167,20 @@ def test_no_step_makes_drag_explode(integrator: str, drag: str) -> None:
     sim = one_particle(velocity=(50.0, -20.0, 7.0), force=[force], integrator=integrator, step=10.0)
     sim.run(steps=3)
     assert sim["ball"].velocity[0] == pytest.approx([3.0, 0.0, 0.0], abs=1e-5)
+
+
+def test_backward_euler_divides_stiff_drag_by_its_closed_form() -> None:
+    """v1 = (v0 + h g) / (1 + h k) at h k = 1e6, to the rounding of single precision."""
+    sim = one_particle(
+        velocity=(8.0, 0.0, 0.0),
+        force=[motes.force.Drag(rate=1e6), motes.force.Gravity()],
+        integrator="backward_euler",
+        step=1.0,
+        precision="single",
+    )
+    sim.run(steps=3)
+    assert sim["ball"].velocity[0, 2] == pytest.approx(-9.81e-6, rel=2e-6)
+    assert abs(sim["ball"].velocity[0, 0]) < 1e-12
 
 
 def test_drag_decays_exactly_in_a_splitting() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numba import njit
 
 from motes import ode
 from motes.integrate import methods
@@ -84,6 +85,39 @@ def test_stiff_van_der_pol_ends_where_the_test_set_says(method):
     assert r.success
     assert r.steps < 2000
     assert r.y[-1] == pytest.approx([1.706167732170483, -8.928097010247975e-4], rel=1e-4)
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_every_implicit_method_chooses_its_steps(method):
+    """The error per step stays near the tolerance, so that it falls with it; compiled as well."""
+    loose, tight = (1e-3, 1e-4) if methods()[method].order == 1 else (1e-4, 1e-6)
+    low, order = getattr(methods()[method], "low_order", 2), methods()[method].order
+    errors = []
+    for tolerance in (loose, tight):
+        r = ode.solve(
+            lambda t, y: (-y[1], y[0]), [1.0, 0.0], (0, 6), method=method, rtol=tolerance,
+            atol=tolerance,
+        )  # fmt: skip
+        assert r.success
+        exact = np.column_stack([np.cos(r.t), np.sin(r.t)])
+        errors.append(np.abs(r.y - exact).max())
+    # Errors of steps of one tolerance add up to tolerance^(order / (order of the estimate)).
+    share = order / (min(order, low) + 1)
+    assert errors[1] < 2 * errors[0] * (tight / loose) ** share
+    assert errors[0] < 0.2
+
+
+@pytest.mark.parametrize("method", ["bdf2", "radau5", "sdirk2"])
+def test_compiled_implicit_solves_are_those_of_a_plain_function(method):
+    """One source serves both, Newton's method and matrices included."""
+    plain = ode.solve(stiff, [2.0, 0.0], (0, 4), method=method, rtol=1e-5, atol=1e-7)
+    fast = ode.solve(njit(stiff), [2.0, 0.0], (0, 4), method=method, rtol=1e-5, atol=1e-7)
+    assert fast.evaluations == plain.evaluations
+    assert fast.y == pytest.approx(plain.y, rel=1e-8, abs=1e-10)
+
+
+def stiff(t, y):
+    return y[1], 50 * (1 - y[0] ** 2) * y[1] - y[0]
 
 
 def test_every_way_to_the_jacobian_leads_to_the_same_solution():

@@ -101,7 +101,7 @@ def test_rows_of_implicit_tables_are_whole():
 
 def test_scenes_refuse_what_they_cannot_run():
     for name, table in methods().items():
-        if isinstance(table, Explicit | Splitting):
+        if name not in ("bdf2", "nystrom5", "radau5", "rodas4"):
             assert method(name) is table
         else:
             with pytest.raises(SceneError, match="not in a scene"):

@@ -11,6 +11,7 @@ import click
 
 from motes.cli.options import json_option
 from motes.cli.progress import rounded
+from motes.record.energy import Measures, to_json
 
 
 @click.command(short_help="Show what kept frames hold.")
@@ -41,6 +42,12 @@ def command(folder: Path, as_json: bool) -> None:
             name: {key: {"dtype": str(a.dtype), "shape": a.shape} for key, a in columns.items()}
             for name, columns in last.systems.items()
         }
+    measures = store.measures()
+    if measures:
+        facts["measures"] = {
+            str(number): {**to_json(m), "energy": m.energy, "virial_ratio": m.virial_ratio}
+            for number, m in measures.items()
+        }
     if as_json:
         click.echo(json.dumps({**facts, "scene": manifest.scene}, indent=2, ensure_ascii=False))
         return
@@ -51,11 +58,26 @@ def command(folder: Path, as_json: bool) -> None:
         ("frames", f"{facts['frames'] or 'none'} at {manifest.fps:g} a second"),
         ("size", f"{rounded(facts['bytes'])}B"),
     ]
+    if measures:
+        rows += _kept(list(measures.values()))
     for name, columns in facts["systems"].items():
         rows.append((name, f"{_columns(columns)} in frame {numbers[-1]}"))
     text = click.HelpFormatter()
     text.write_dl(rows)
     click.echo(text.getvalue().rstrip())
+
+
+def _kept(measures: list[Measures]) -> list[tuple[str, str]]:
+    """What a closed system keeps, from the first frame with mass to the last."""
+    first = next((m for m in measures if m.mass), measures[0])
+    last = measures[-1]
+    change = abs(last.energy / first.energy - 1) if first.energy else 0.0
+    size = [float(sum(c * c for c in m.momentum) ** 0.5) for m in (first, last)]
+    return [
+        ("energy", f"{first.energy:.6g} J, then {last.energy:.6g} J: a change of {change:.1e}"),
+        ("momentum", f"{size[0]:.3g} kg m/s, then {size[1]:.3g} kg m/s"),
+        ("2 T / |U|", f"{first.virial_ratio:.4g}, then {last.virial_ratio:.4g}"),
+    ]
 
 
 def ranges(numbers: list[int]) -> str:

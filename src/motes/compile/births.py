@@ -22,14 +22,14 @@ CUT = 1.0 - np.exp(-8.0)
 _log, _cos, _sin = (f.compiled("double") for f in (log, cos, sin))
 
 
-@jit(flags=EXACT, inline=True)
+@jit(flags=EXACT)
 def uniforms(seed: Any, id: Any, name: Any) -> Any:
     """Two uniform numbers in [0, 1) for a particle and a channel."""
     a, b, c, d = draw(seed, id, name, FIRST_TICK)
     return uniform_double(a, b), uniform_double(c, d)
 
 
-@jit(flags=EXACT, inline=True)
+@jit(flags=EXACT)
 def normals(seed: Any, id: Any, name: Any) -> Any:
     """Two normal numbers, their pair cut off at a radius of 4 (Box and Muller)."""
     u, v = uniforms(seed, id, name)

@@ -56,8 +56,13 @@ def encounter_kernel(solid: dict[str, Any], surfaces: Surfaces, inertial: bool) 
             if d > touching(x, y, z):
                 break
             x, y, z = x - d * nx, y - d * ny, z - d * nz
+            settled = d >= -touching(x, y, z)
             if inertial:
-                wx, wy, wz = reflect(wx, wy, wz, contact, 0.0)
+                ux, uy, uz = reflect(wx, wy, wz, contact, 0.0)
+                settled = settled & (ux == wx) & (uy == wy) & (uz == wz)
+                wx, wy, wz = ux, uy, uz
+            if settled:
+                break
         return x, y, z, wx, wy, wz
 
     @jit(flags=EXACT)
@@ -82,13 +87,15 @@ def encounter_kernel(solid: dict[str, Any], surfaces: Surfaces, inertial: bool) 
                 if moving and pull >= 0.0:
                     start = 1e-6
                 elif 2.0 * out <= SHORT * -pull * h:
-                    return x, y, z, w0[0], w0[1], w0[2], t, hits, True
+                    x, y, z, wx, wy, wz = rest(p1[0], p1[1], p1[2], w1, end, KS)
+                    return x, y, z, wx, wy, wz, end, hits, True
                 else:
                     start = min(out / (-pull * h), 1.0)
                 a, b, c = hermite(x, y, z, w0, p1, w1, h, start)
                 g = gap(a, b, c, t + start * h, KS)
                 if g < 0.0:
-                    return x, y, z, w0[0], w0[1], w0[2], t, hits, True
+                    x, y, z, wx, wy, wz = rest(p1[0], p1[1], p1[2], w1, end, KS)
+                    return x, y, z, wx, wy, wz, end, hits, True
         s = 0.0
         if start >= 0.0:
             s = first_impact(x, y, z, w0, p1, w1, t, h, g, start, moving, KS)
@@ -112,19 +119,40 @@ def encounter_kernel(solid: dict[str, Any], surfaces: Surfaces, inertial: bool) 
     return encounter
 
 
+def poses_at(solid: dict[str, Any], surfaces: Surfaces) -> Any:
+    """The function of KS, the solids' numbers and their poses at one time, and of a time.
+
+    It gives the tuple D of the solids, or what KS holds of it where no solid ever moves.
+    """
+    scene, solids = solid["scene"], solid["solids"]
+    if surfaces.moving:
+
+        @jit(flags=EXACT, inline=True)
+        def poses(KS, t):  # type: ignore[no-untyped-def]
+            return solids(scene(KS[0], t))
+
+    else:
+
+        @jit(flags=EXACT, inline=True)
+        def poses(KS, t):  # type: ignore[no-untyped-def]
+            return KS[1]
+
+    return poses
+
+
 def _probes(solid: dict[str, Any], surfaces: Surfaces) -> tuple[Any, Any]:
     """`gap`: the distance of a point at a time; `touch`: that and all that a contact needs."""
-    scene, solids, near, moved = (solid[n] for n in ("scene", "solids", "near", "moved"))
-    starts, moving = surfaces.starts, surfaces.moving
+    near, moved = solid["near"], solid["moved"]
+    poses, starts, moving = poses_at(solid, surfaces), surfaces.starts, surfaces.moving
 
     @jit(flags=EXACT)
     def gap(x, y, z, t, KS):  # type: ignore[no-untyped-def]
-        return near(solids(scene(KS, t)), x, y, z)[0]
+        return near(poses(KS, t), x, y, z)[0]
 
     @jit(flags=EXACT)
     def touch(x, y, z, t, KS):  # type: ignore[no-untyped-def]
         """Distance, normal, surface velocity, restitution and friction at a point and time."""
-        D = solids(scene(KS, t))
+        D = poses(KS, t)
         d, which = near(D, x, y, z)
         e = SLOPE * (1.0 + abs(x) + abs(y) + abs(z))
         nx = gap(x + e, y, z, t, KS) - gap(x - e, y, z, t, KS)
@@ -138,8 +166,8 @@ def _probes(solid: dict[str, Any], surfaces: Surfaces) -> tuple[Any, Any]:
         k = starts[which]
         sx, sy, sz = 0.0, 0.0, 0.0
         if moving:
-            ax, ay, az = moved(D, solids(scene(KS, t - MOMENT)), k, x, y, z)
-            bx, by, bz = moved(D, solids(scene(KS, t + MOMENT)), k, x, y, z)
+            ax, ay, az = moved(D, poses(KS, t - MOMENT), k, x, y, z)
+            bx, by, bz = moved(D, poses(KS, t + MOMENT), k, x, y, z)
             m = 0.5 / MOMENT
             sx, sy, sz = m * (bx - ax), m * (by - ay), m * (bz - az)
         return d, nx, ny, nz, sx, sy, sz, D[k + POSE], D[k + HEAD - 1]

@@ -64,12 +64,14 @@ def gather_kernel(laws: Sequence[Law]) -> Any:
             body += f"                sum{k} += weight * n{k}\n"
             end += f"            out[{k}, t] = sum{k}\n"
         place += width
+    limits = ", ".join(f"limit{i}" for i in range(len(laws)))
+    widest = f"max({limits})" if len(laws) > 1 else limits
     lines = (
         "@kernel\ndef gather(numbers, limits, grid, targets, key, sources, cells, itself, "
         "begin, end, room_, out):\n"
         "    runs, slots, room, near_, pick, kept = room_\n"
-        "    number, points, size, i = 0, 0, 0, begin\n    most = limits.max()\n"
-        f"{prelude}"
+        "    number, points, size, i = 0, 0, 0, begin\n"
+        f"{prelude}    most = {widest}\n"
     )
     lines += "".join(f"    t_{n} = targets[{k}]\n" for k, n in enumerate(own))
     for k, n in enumerate(other):

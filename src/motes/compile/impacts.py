@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from motes.compile.encounter import encounter_kernel
+from motes.compile.encounter import encounter_kernel, poses_at
 from motes.compile.motion import Motion, stage_times
 from motes.compile.surfaces import Surfaces
 from motes.compile.text import STATE, Text
@@ -49,11 +49,15 @@ def exceptions_kernel(
     """
     gather, fly, inertial = module["gather"], module["fly"], motion.inertial
     resolve = _free() if surfaces is None else _flight(module, solid, surfaces, inertial)
+    posed, length = _posed(solid, surfaces), surfaces.length if surfaces else 1
 
     @jit(flags=EXACT)
     def exceptions(position, velocity, birth, columns, rows, K, KS, t, dt):  # type: ignore[no-untyped-def]
         impacts = 0
         end = t + dt
+        D = np.empty(length)
+        posed(KS, t, D)
+        KP = (KS, D)
         for r in range(rows.size):
             i = rows[r]
             x, y, z = triple(position, i)
@@ -62,7 +66,7 @@ def exceptions_kernel(
             begin = max(t, born)
             ends = fly(x, y, z, vx, vy, vz, born, begin, end - begin, C, K)
             x, y, z, vx, vy, vz, hits = resolve(
-                x, y, z, vx, vy, vz, ends, born, begin, end, C, K, KS, 0.0, 0.0, 0.0
+                x, y, z, vx, vy, vz, ends, born, begin, end, C, K, KP, 0.0, 0.0, 0.0
             )
             impacts += hits
             position[0, i], position[1, i], position[2, i] = x, y, z
@@ -85,10 +89,14 @@ def rebounds_kernel(
     """
     gather, fly = module["gather"], module["fly"]
     resolve = _flight(module, solid, surfaces, motion.inertial)
+    posed, length = _posed(solid, surfaces), surfaces.length
 
     @jit(flags=EXACT)
     def rebounds(position, velocity, ends, birth, columns, rows, K, KS, t, dt):  # type: ignore[no-untyped-def]
         impacts, changed = 0, 0
+        D = np.empty(length)
+        posed(KS, t, D)
+        KP = (KS, D)
         for r in range(rows.size):
             i = rows[r]
             x, y, z = triple(position, i)
@@ -99,7 +107,7 @@ def rebounds_kernel(
             _, _, _, ux, uy, uz = fly(x, y, z, vx, vy, vz, born, t, dt, C, K)
             gx, gy, gz = (va - ux) / dt, (vb - uy) / dt, (vc - uz) / dt
             x, y, z, vx, vy, vz, hits = resolve(
-                x, y, z, vx, vy, vz, (a, b, c, va, vb, vc), born, t, t + dt, C, K, KS, gx, gy, gz
+                x, y, z, vx, vy, vz, (a, b, c, va, vb, vc), born, t, t + dt, C, K, KP, gx, gy, gz
             )
             impacts += hits
             same = (x == a) & (y == b) & (z == c) & (vx == va) & (vy == vb) & (vz == vc)
@@ -131,6 +139,27 @@ def triple(block: Any, i: Any) -> Any:
     return np.float64(block[0, i]), np.float64(block[1, i]), np.float64(block[2, i])
 
 
+@jit(flags=EXACT, inline=True)
+def _no_poses(KS: Any, t: Any, D: Any) -> None:
+    """Where there is no solid."""
+    D[0] = 0.0
+
+
+def _posed(solid: dict[str, Any], surfaces: Surfaces | None) -> Any:
+    """The function that writes the solids' poses at a time into an array."""
+    if surfaces is None:
+        return _no_poses
+    scene, solids = solid["scene"], solid["solids"]
+
+    @jit(flags=EXACT, inline=True)
+    def posed(KS, t, D):  # type: ignore[no-untyped-def]
+        now = solids(scene(KS, t))
+        for i in range(D.size):
+            D[i] = now[i]
+
+    return posed
+
+
 def _free() -> Any:
     """A flight that meets nothing."""
 
@@ -150,7 +179,7 @@ def _flight(
     After an impact the row flies on with the forces of its system and a push (gx, gy, gz) [m/s2].
     """
     fly, total = module["fly"], module["total"]
-    solids, scene, threatened = solid["solids"], solid["scene"], solid["threatened"]
+    threatened, poses = solid["threatened"], poses_at(solid, surfaces)
     encounter, moving = encounter_kernel(solid, surfaces, inertial), surfaces.moving
 
     @jit(flags=EXACT, inline=True)
@@ -158,8 +187,8 @@ def _flight(
         # Not literals, for which Numba would compile `encounter` once more.
         hits, resting = np.int64(0), np.bool_(False)
         a, b, c, va, vb, vc = ends
-        D = solids(scene(KS, t))
-        E = solids(scene(KS, end)) if moving else D
+        D = poses(KS, t)
+        E = poses(KS, end) if moving else D
         if not threatened(D, E, x, y, z, vx, vy, vz, a, b, c, va, vb, vc, end - t):
             return a, b, c, va, vb, vc, hits
         while t < end:

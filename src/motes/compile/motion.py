@@ -9,10 +9,12 @@ from itertools import pairwise
 import numpy as np
 
 from motes.catalog import Component
+from motes.compile import implicit
 from motes.compile.surfaces import write_surfaces
 from motes.compile.text import AXES, STATE, Call, Text, packed
 from motes.control.control import Control
-from motes.tableau import Explicit, Method, Splitting
+from motes.errors import SceneError
+from motes.tableau import Explicit, Implicit, Method, Splitting
 
 PARTICLE = {"age": "age", "id": "id", "obstacle": "obstacle"}
 """Columns of `q` that the engine computes itself."""
@@ -88,6 +90,8 @@ def write_motion(text: Text, motion: Motion) -> None:
     writer.right_hand_side()
     if isinstance(motion.method, Explicit):
         writer.explicit(motion.method)
+    elif isinstance(motion.method, Implicit):
+        writer.implicit(motion.method)
     else:
         writer.splitting(motion.method)
     if motion.mortal:
@@ -105,6 +109,8 @@ def stage_times(method: Method) -> tuple[float, ...]:
     """Times at which the scene's values are needed, as shares of the step."""
     if isinstance(method, Explicit):
         return method.c
+    if isinstance(method, Implicit):
+        return tuple(method.c[i] for i in implicit.stages(method))
     kicks = method.times
     middles = [(a + b) / 2 for a, b in pairwise(kicks)]
     return tuple(sorted({*kicks, *middles}))
@@ -130,8 +136,6 @@ class _Writer:
         return self.text.record("Q", fields)
 
     def _trait(self, name: str) -> tuple[str, Control]:
-        from motes.errors import SceneError
-
         if name in self.motion.traits:
             return self.motion.traits[name]
         menu = ", ".join(sorted({*self.motion.traits, *PARTICLE}))
@@ -280,6 +284,15 @@ class _Writer:
             lines += "".join(f"    {n} = {e}\n" for n, e in zip(names, state, strict=True))
             lines += self._slopes(i, names, method.c[i])
         self._advance(method, lines, stages[-1])
+
+    def implicit(self, method: Implicit) -> None:
+        """`advance` with Newton's method for each stage."""
+        if not self.motion.inertial:
+            raise SceneError(
+                "an implicit integrator is for forces; give a system that flows alone carry another"
+            )
+        self.text.add(implicit.settle_text(self.text.precision))
+        self._advance(method, *implicit.advance_lines(method))
 
     def splitting(self, method: Splitting) -> None:
         """`advance` as kicks and drifts; relaxations are exact, so that no step explodes."""

@@ -13,11 +13,14 @@ from motes.compile.straight import THREATENED
 from motes.compile.surfaces import Surfaces
 from motes.compile.text import AXES, STATE, Text
 from motes.jit import jit
-from motes.tableau import Splitting
+from motes.tableau import Implicit, Splitting
 
 
 def write_staged(text: Text, motion: Motion) -> None:
-    """Write `slope` (for Runge-Kutta methods) or `kick` and `drift` (for splittings)."""
+    """Write `slope` (for Runge-Kutta methods), `settled` (implicit ones), `kick` and `drift`.
+
+    `settled` solves a stage of each row with its push given: Y becomes base + dt f(Y).
+    """
     columns = sum(c.width for c in text.values.columns)
     names = [f"c{i}" for i in range(columns)]
     carried = "(" + "".join(f"{n}[i], " for n in names) + ("" if names else "F(0.0),") + ")"
@@ -49,6 +52,12 @@ def write_staged(text: Text, motion: Motion) -> None:
     )
     head = "@kernel\ndef slope(Y, birth, columns, push, slope_, K, t, lo, hi):\n"
     text.add(head + slices + outputs + begin + flows + pushed + change)
+    if isinstance(motion.method, Implicit):
+        bases = "".join(f"    p{n} = base[{k}][lo:hi]\n" for k, n in enumerate(STATE))
+        known = ", ".join(f"p{n}[i]" for n in STATE)
+        body = f"        {row} = settle({known}, gx[i], gy[i], gz[i], g, age, C, S, L, now)\n"
+        head = "@kernel\ndef settled(Y, birth, columns, push, base, K, t, dt, lo, hi):\n"
+        text.add(head + slices + bases + "    g = F(dt)\n" + begin + body)
 
 
 def write_threats(text: Text, surfaces: Surfaces) -> None:

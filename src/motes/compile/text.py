@@ -111,7 +111,7 @@ class Text:
             "uint8": np.uint8,
             "empty": np.empty,
             "inline": lambda f: jit(f, flags=flags, inline=True),
-            "kernel": lambda f: jit(f, flags=flags),
+            "kernel": lambda f: jit(f, flags=flags, numba=False),
             "lookup": _lookup(self.real, flags),
             **self.translation.types,
             **self.records,
@@ -126,9 +126,13 @@ class Text:
             from motes.control.spline_kernels import spline_at
 
             scope["spline_at"] = spline_at
-        file = _keep(source)
-        exec(compile(source, file, "exec"), scope)
-        return scope
+        return executed(source, scope)
+
+
+def executed(source: str, scope: dict[str, Any]) -> dict[str, Any]:
+    """Run the text of a module in a scope, kept where the compiler and tracebacks find it."""
+    exec(compile(source, _keep(source), "exec"), scope)
+    return scope
 
 
 def _known(component: Component) -> dict[str, tuple[float, ...]]:

@@ -116,7 +116,7 @@ def _folded(table: Any, mode: Any, t: Any) -> Any:
     return cycle, first + rest
 
 
-@jit(flags=STRICT, inline=True)
+@jit(flags=STRICT)
 def spline_at(table: Any, t: Any) -> Any:
     """Value of a packed scalar spline at time t, float64."""
     if t < table[0, FIRST]:
@@ -137,14 +137,14 @@ def spline_at(table: Any, t: Any) -> Any:
     return _value_at(segment, _parameter(segment, t))
 
 
-@jit(flags=STRICT, inline=True)
+@jit(flags=STRICT)
 def _inner_integral(table: Any, t: Any) -> Any:
     """Integral from the first key to a time between the keys."""
     segment = table[_row(table, START, t)]
     return segment[SUM] + _integral_at(segment, _parameter(segment, t))
 
 
-@jit(flags=STRICT, inline=True)
+@jit(flags=STRICT)
 def integral_at(table: Any, t: Any) -> Any:
     """Integral of a packed scalar spline from its first key to time t, float64."""
     first, last, total = table[0, FIRST], table[0, LAST], table[0, TOTAL]
@@ -167,7 +167,7 @@ def integral_at(table: Any, t: Any) -> Any:
     return cycle * total + rest
 
 
-@jit(flags=STRICT, inline=True)
+@jit(flags=STRICT)
 def _inner_when(table: Any, amount: Any, earliest: Any) -> Any:
     """Earliest or latest time between the keys at which the integral is `amount`.
 
@@ -197,7 +197,7 @@ def _inner_when(table: Any, amount: Any, earliest: Any) -> Any:
     return segment[START] + segment[LENGTH] * _time_at(segment, u)
 
 
-@jit(flags=STRICT, inline=True)
+@jit(flags=STRICT)
 def when_at(table: Any, amount: Any) -> Any:
     """Earliest time at which `integral_at` of a spline that is nowhere negative is `amount`.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -57,6 +58,24 @@ class Measures:
         Source: Clausius, Annalen der Physik 217 (1870) 124.
         """
         return 2.0 * self.kinetic / abs(self.potential) if self.potential else float("nan")
+
+
+def to_json(measures: Measures) -> dict[str, Any]:
+    """Fields as JSON holds them."""
+    fields = {f.name: getattr(measures, f.name) for f in dataclasses.fields(measures)}
+    return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in fields.items()}
+
+
+def from_json(fields: dict[str, Any]) -> Measures:
+    """The same measures again.
+
+    Raises:
+        TypeError: these are not the fields of measures.
+    """
+    values: dict[str, Any] = {
+        k: np.array(v) if isinstance(v, list) else v for k, v in fields.items()
+    }
+    return Measures(**values)
 
 
 def measure(time: float, systems: Iterable[Matter], potential: float) -> Measures:

@@ -18,6 +18,7 @@ from motes.errors import OutputError
 from motes.files import content, fault, sweep, written_whole
 from motes.frame import Frame
 from motes.record.encoding import decode, encode
+from motes.record.energy import Measures, from_json, to_json
 
 FORMAT = 1
 """Version of the manifest; it grows when an older motes would misread a newer one."""
@@ -52,7 +53,8 @@ class FrameStore:
     """Frames in a folder.
 
     `store.write(frame)` keeps one, `store.read(12)` gives one back exactly, `store.numbers()` says
-    which there are.
+    which there are. Beside frames of a scene with interactions, `store.measures()` has energy,
+    momentum and virial ratio by frame.
     """
 
     folder: Path
@@ -105,11 +107,11 @@ class FrameStore:
 
     def _clear(self) -> None:
         for number in self.numbers():
-            path = self.path(number)
-            try:
-                path.unlink(missing_ok=True)
-            except OSError as error:
-                raise fault("remove", path, error) from error
+            for path in (self._notes(number), self.path(number)):
+                try:
+                    path.unlink(missing_ok=True)
+                except OSError as error:
+                    raise fault("remove", path, error) from error
 
     def path(self, number: int) -> Path:
         """The file of a frame."""
@@ -156,6 +158,34 @@ class FrameStore:
         if frame.index != number:
             raise OutputError(f"{path} is damaged: it holds frame {frame.index}.")
         return frame
+
+    def note(self, number: int, measures: Measures) -> None:
+        """Keep energy, momentum and the rest beside a frame.
+
+        Raises:
+            OutputError: the file cannot be written.
+        """
+        with written_whole(self._notes(number)) as file:
+            file.write(json.dumps(to_json(measures)).encode() + b"\n")
+
+    def measures(self) -> dict[int, Measures]:
+        """What was noted beside each frame, by its number, in order.
+
+        Raises:
+            OutputError: a file is damaged.
+        """
+        found = {}
+        for number in self.numbers():
+            path = self._notes(number)
+            if path.is_file():
+                try:
+                    found[number] = from_json(json.loads(content(path)))
+                except (ValueError, TypeError) as error:
+                    raise OutputError(f"{path} is damaged: it holds no measures.") from error
+        return found
+
+    def _notes(self, number: int) -> Path:
+        return self.folder / f"{number:05d}.measures.json"
 
     def __iter__(self) -> Iterator[Frame]:
         """All frames in order, one in memory at a time."""

@@ -39,7 +39,7 @@ class Lanes(types.Type):
 
 
 @register_model(Lanes)
-class _Model(models.PrimitiveModel):  # type: ignore[misc]
+class _Model(models.PrimitiveModel):
     def __init__(self, manager: Any, lanes: Lanes) -> None:
         element = manager.lookup(lanes.element).get_value_type()
         super().__init__(manager, lanes, ir.VectorType(element, LANES))
@@ -49,13 +49,13 @@ def _define(sign: Any, name: str) -> None:
     """Let kernels write `a sign b` for two lanes."""
 
     @infer_global(sign)
-    class Arithmetic(AbstractTemplate):  # type: ignore[misc]
+    class Arithmetic(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
             if len(args) == 2 and isinstance(args[0], Lanes) and args[0] == args[1]:
                 return signature(args[0], *args)
             return None
 
-    @lower_builtin(sign, Lanes, Lanes)  # type: ignore[untyped-decorator]
+    @lower_builtin(sign, Lanes, Lanes)
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return getattr(builder, name)(*args)
 
@@ -267,9 +267,9 @@ else:
             near = builder.fptrunc(x, single)
             one = constant(ir.FloatType(), 1.0)
             y = builder.fpext(builder.fdiv(one, square_root(builder, near)), x.type)
-            number = lambda value: constant(x.type.element, value)  # noqa: E731
-            h = builder.fsub(number(1.0), builder.fmul(x, builder.fmul(y, y)))
-            step = builder.fadd(number(0.5), builder.fmul(number(0.375), h))
+            h = builder.fsub(constant(x.type.element, 1.0), builder.fmul(x, builder.fmul(y, y)))
+            step = builder.fmul(constant(x.type.element, 0.375), h)
+            step = builder.fadd(constant(x.type.element, 0.5), step)
             return builder.fadd(y, builder.fmul(builder.fmul(y, h), step))
 
         return lanes(lanes), generate

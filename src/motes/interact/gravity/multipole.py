@@ -51,7 +51,7 @@ tolerance, as errors of many expansions cancel and the estimate is an upper boun
 TRIALS = 8
 """Trials before all is summed by pairs."""
 
-STRICTER = 5.0
+STRICTER = 20.0
 """How much less the walk that the sample is compared with may neglect."""
 
 HIGHEST = {True: 9, False: 6}
@@ -160,13 +160,14 @@ class Problem:
         share, strictest = tolerance * GROWTH ** (self.plan.order - 2), math.inf
         kept = None
         for _ in range(TRIALS):
-            limits = self.limits(share * scale, share * force, rounding)
+            # A sun's momentum hangs on single expansions, whose errors do not cancel.
+            limits = self.limits(share * scale, min(share, 8 * tolerance) * force, rounding)
             if share / STRICTER < strictest:
                 strictest = share / STRICTER
                 strict = limits._replace(
                     opening2=limits.opening2 / 4,
                     error=strictest * scale,
-                    force=strictest * force,
+                    force=limits.force / STRICTER,
                     rounding=rounding / STRICTER,
                 )
                 exact = self._at(sample, strict)

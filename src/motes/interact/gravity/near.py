@@ -76,7 +76,7 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
                 if potential and own[0] <= i < own[1] and depth > 0.0:
                     part[4, i] += targets.near[3, start + i] * (depth / limits.size)
                 x = part[0, i]
-                if not blur * part[3, i] <= limits.rounding or not x == x:
+                if not blur * part[3, i] <= limits.rounding or x != x:
                     place = targets.place[:, start + i]
                     sum_exactly(
                         sources, desk.spans, spans, place, limits.size, desk.exact, part[:, i]

@@ -30,10 +30,10 @@ def center_depth(law: str, size: float) -> float:
     return {"newton": 0.0, "plummer": 1.0, "spline": SUPPORT}[law] / (size or 1.0)
 
 
-LEAST = {np.float32: 1e-24, np.float64: 1e-37}
+LEAST: dict[type, float] = {np.float32: 1e-24, np.float64: 1e-37}
 """Least squared distance that is told from 0, in boxes: the cube of its root is still a number."""
 
-PART = {np.float32: 2 / 3, np.float64: 1.0}
+PART: dict[type, float] = {np.float32: 2 / 3, np.float64: 1.0}
 """What a law gives of s: in single precision it is cheaper to leave a factor to the end."""
 
 
@@ -41,10 +41,10 @@ PART = {np.float32: 2 / 3, np.float64: 1.0}
 def pair_law(law: str, real: type, guarded: bool = True) -> Callable[..., Any]:
     """Compiled function (r2, size) -> (PART s, w), of lanes of type `real`.
 
-    `size` is a length and its inverse: Plummer's softening, or the spline's support radius. Not `guarded`, Newton's
-    law is not a number at r = 0. Sources: Plummer, MNRAS 71 (1911) 460; the spline of Monaghan and
-    Lattanzio, A&A 149 (1985) 135, as in Springel, Yoshida and White, New Astronomy 6 (2001) 79,
-    equation A1 and its gradient.
+    `size` is a length and its inverse: Plummer's softening, or the spline's support radius. Not
+    `guarded`, Newton's law is not a number at r = 0. Sources: Plummer, MNRAS 71 (1911) 460; the
+    spline of Monaghan and Lattanzio, A&A 149 (1985) 135, as in Springel, Yoshida and White, New
+    Astronomy 6 (2001) 79, equation A1 and its gradient.
     """
     powers = _powers(real)
     if law == "plummer":

@@ -54,7 +54,7 @@ class Wire:
     def __init__(self, builder: Any, value: Any) -> None:
         self.builder, self.value = builder, value
 
-    def _with(self, other: Any, operation: Callable[[Any, Any], Any]) -> Wire:
+    def _with(self, other: Any, operation: Callable[..., Any]) -> Wire:
         a, b = self.value, other.value if isinstance(other, Wire) else other
         if not isinstance(other, Wire):
             wide = isinstance(a.type, ir.VectorType)

@@ -320,7 +320,8 @@ def summarize(tree: Tree, order: int, harmonic: bool, real: type, sources: bool)
     tree = tree._replace(moments=np.zeros((count, padded(operations.basis)), real), near=near)
 
     def cells(first: int, last: int) -> None:
-        place, sums = np.ones((5, LANES), real), np.empty((operations.every, LANES), real)
+        place: NDArray[Any] = np.ones((5, LANES), real)
+        sums: NDArray[Any] = np.empty((operations.every, LANES), real)
         fill(tree, first, last, real is np.float32, place, np.zeros(LANES, np.int32), sums)
 
     share(lambda k: cells(branches[k], int(tree.cells[branches[k], SKIP])), len(branches))

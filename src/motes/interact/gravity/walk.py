@@ -13,8 +13,6 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import numpy as np
-
 from motes.interact.gravity.desk import Desk, Limits
 from motes.interact.gravity.lanes import LANES
 from motes.interact.gravity.near import near_field

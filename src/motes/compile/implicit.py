@@ -1,0 +1,117 @@
+"""Implicit methods for particles: Newton's method for the velocity of one stage of one particle.
+
+A stage is X = p + g (V + u(X)), V = q + g A(X, V), with p and q known and g its own share of
+the step. X is put into the second equation, which leaves three unknowns; their matrix
+1 - g dA/dV - g^2 dA/dX comes from differences at the stage's start. Rows are solved one by one, as
+far as each needs.
+"""
+
+from __future__ import annotations
+
+from motes.compile.text import AXES, STATE
+from motes.tableau import Implicit
+
+ITERATIONS = 20
+
+SETTLE = """
+@inline
+def felt(x, y, z, vx, vy, vz, gx, gy, gz, age, C, S, L, t):
+    ax, ay, az, r, bx, by, bz = pushed(x, y, z, vx, vy, vz, age, C, S, L, t)
+    return ax + bx + gx - r * vx, ay + by + gy - r * vy, az + bz + gz - r * vz
+
+
+@inline
+def settle(px, py, pz, qx, qy, qz, gx, gy, gz, g, age, C, S, L, t):
+    vx, vy, vz = qx, qy, qz
+    ux, uy, uz = carried(px, py, pz, vx, vy, vz, age, C, S, L, t)
+    x, y, z = px + g * (vx + ux), py + g * (vy + uy), pz + g * (vz + uz)
+    ax, ay, az = felt(x, y, z, vx, vy, vz, gx, gy, gz, age, C, S, L, t)
+    d = F(ROOT) * (F(1.0) + abs(x) + abs(y) + abs(z))
+    w = F(ROOT) * (F(1.0) + abs(vx) + abs(vy) + abs(vz))
+    fx, fy, fz = felt(x + d, y, z, vx, vy, vz, gx, gy, gz, age, C, S, L, t)
+    hx, hy, hz = felt(x, y, z, vx + w, vy, vz, gx, gy, gz, age, C, S, L, t)
+    c, e = g * g / d, g / w
+    m00 = F(1.0) - c * (fx - ax) - e * (hx - ax)
+    m10 = -c * (fy - ay) - e * (hy - ay)
+    m20 = -c * (fz - az) - e * (hz - az)
+    fx, fy, fz = felt(x, y + d, z, vx, vy, vz, gx, gy, gz, age, C, S, L, t)
+    hx, hy, hz = felt(x, y, z, vx, vy + w, vz, gx, gy, gz, age, C, S, L, t)
+    m01 = -c * (fx - ax) - e * (hx - ax)
+    m11 = F(1.0) - c * (fy - ay) - e * (hy - ay)
+    m21 = -c * (fz - az) - e * (hz - az)
+    fx, fy, fz = felt(x, y, z + d, vx, vy, vz, gx, gy, gz, age, C, S, L, t)
+    hx, hy, hz = felt(x, y, z, vx, vy, vz + w, gx, gy, gz, age, C, S, L, t)
+    m02 = -c * (fx - ax) - e * (hx - ax)
+    m12 = -c * (fy - ay) - e * (hy - ay)
+    m22 = F(1.0) - c * (fz - az) - e * (hz - az)
+    i00, i01, i02 = m11 * m22 - m12 * m21, m02 * m21 - m01 * m22, m01 * m12 - m02 * m11
+    i10, i11, i12 = m12 * m20 - m10 * m22, m00 * m22 - m02 * m20, m02 * m10 - m00 * m12
+    i20, i21, i22 = m10 * m21 - m11 * m20, m01 * m20 - m00 * m21, m00 * m11 - m01 * m10
+    s = F(1.0) / (m00 * i00 + m01 * i10 + m02 * i20)
+    last, size = F(1e30), F(1e30)
+    for _ in range(ITERATIONS):
+        rx, ry, rz = qx + g * ax - vx, qy + g * ay - vy, qz + g * az - vz
+        dx = s * (i00 * rx + i01 * ry + i02 * rz)
+        dy = s * (i10 * rx + i11 * ry + i12 * rz)
+        dz = s * (i20 * rx + i21 * ry + i22 * rz)
+        vx += dx
+        vy += dy
+        vz += dz
+        wx, wy, wz = carried(x, y, z, vx, vy, vz, age, C, S, L, t)
+        size = abs(dx) + abs(dy) + abs(dz) + abs(wx - ux) + abs(wy - uy) + abs(wz - uz)
+        ux, uy, uz = wx, wy, wz
+        x, y, z = px + g * (vx + ux), py + g * (vy + uy), pz + g * (vz + uz)
+        if size <= F(NEAR) * (abs(vx) + abs(vy) + abs(vz)) or not size < last:
+            break
+        last = size
+        ax, ay, az = felt(x, y, z, vx, vy, vz, gx, gy, gz, age, C, S, L, t)
+    # Where rounding ended it, that is as near as can be; elsewhere there is no solution.
+    whole = abs(vx) + abs(vy) + abs(vz) + abs(qx) + abs(qy) + abs(qz)
+    if not size <= F(1e-3) * whole:
+        vx = F(1e309)
+    return x, y, z, vx, vy, vz
+"""
+"""`settle` gives the state of a stage; g is a further acceleration, what other particles cause."""
+
+
+def settle_text(precision: str) -> str:
+    """The functions `felt` and `settle` for a precision."""
+    epsilon = 2.0**-23 if precision == "single" else 2.0**-52
+    text = SETTLE.replace("ROOT", repr(epsilon**0.5)).replace("NEAR", repr(epsilon))
+    return text.replace("ITERATIONS", str(ITERATIONS))
+
+
+def stages(method: Implicit) -> tuple[int, ...]:
+    """The stages that a step with a fixed length needs."""
+    return tuple(i for i in range(len(method.b)) if i not in method.spare_stages)
+
+
+def advance_lines(method: Implicit) -> tuple[str, list[str]]:
+    """Source of a step, stage by stage, and its ends; slopes are kx0, kvx0 ..."""
+    lines = ""
+    for place, i in enumerate(stages(method)):
+        earlier = [(stages(method).index(j), w) for j, w in enumerate(method.a[i][:i]) if w]
+        base = [f"p{n}{place}" for n in STATE]
+        lines += "".join(
+            f"    {b} = {_combined(n, earlier)}\n" for b, n in zip(base, STATE, strict=True)
+        )
+        age = f"age + F({float(method.c[i])!r}) * h"
+        call = f"{age}, C, S{place}, L, t{place}"
+        own = method.a[i][i]
+        if own:
+            ends = ", ".join(f"e{n}{place}" for n in STATE)
+            lines += f"    g = F({float(own)!r}) * h\n"
+            lines += f"    {ends} = settle({', '.join(base)}, F(0.0), F(0.0), F(0.0), g, {call})\n"
+            lines += "".join(f"    k{n}{place} = (e{n}{place} - p{n}{place}) / g\n" for n in STATE)
+        else:
+            lines += f"    ux, uy, uz = carried({', '.join(base)}, {call})\n"
+            lines += "".join(f"    k{a}{place} = pv{a}{place} + u{a}\n" for a in AXES)
+            slopes = ", ".join(f"kv{a}{place}" for a in AXES)
+            lines += f"    {slopes} = felt({', '.join(base)}, F(0.0), F(0.0), F(0.0), {call})\n"
+    weights = [(place, method.b[i]) for place, i in enumerate(stages(method)) if method.b[i]]
+    return lines, [_combined(n, weights) for n in STATE]
+
+
+def _combined(name: str, weights: list[tuple[int, float]]) -> str:
+    terms = [f"F({float(w)!r}) * k{name}{place}" for place, w in weights]
+    return f"{name} + h * ({' + '.join(terms)})" if terms else name

@@ -1,0 +1,259 @@
+"""Calls: Python's and NumPy's functions that kernels may use, and other kernels."""
+
+from __future__ import annotations
+
+import math
+import types
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from motes.machine.block import literal
+from motes.machine.kinds import (
+    BOOL,
+    DOUBLE,
+    INT,
+    NUMBERS,
+    Array,
+    Number,
+    Unsupported,
+    of_dtype,
+)
+from motes.machine.memory import Memory
+from motes.machine.values import Group, Known, Scalar, Value, View, type_of
+
+ROOM = 1 << 14
+"""Elements of an array that is kept on the stack; larger ones, or of a size that is not known while
+compiling, come from the heap."""
+
+
+def constant(thing: Any) -> Value:
+    """The value of a Python object that a function finds in its module or closure."""
+    if isinstance(thing, bool | np.bool_):
+        return literal(bool(thing), BOOL)
+    if isinstance(thing, np.generic):
+        return literal(thing.item(), of_dtype(thing.dtype))
+    if isinstance(thing, int):
+        return literal(thing, INT, bare=True)
+    if isinstance(thing, float):
+        return literal(thing, DOUBLE, bare=True)
+    if isinstance(thing, tuple):
+        return Group(tuple(constant(t) for t in thing), tuple(getattr(thing, "_fields", ())))
+    return Known(thing)
+
+
+def plain_function(thing: Any) -> types.FunctionType | None:
+    """The Python function behind a kernel, a compiled function or a function; else None."""
+    function = getattr(thing, "py_func", thing)
+    return function if isinstance(function, types.FunctionType) else None
+
+
+class Calls(Memory):
+    """Calls by what is called."""
+
+    def call(self, thing: Any, arguments: Sequence[Value]) -> Value:
+        """The value of a call of something known."""
+        try:
+            handler = BUILT_IN.get(thing)
+        except TypeError:
+            handler = None
+        if handler is not None:
+            return handler(self, *arguments)
+        if isinstance(thing, type) and issubclass(thing, np.generic):
+            return self.cast(self._number(*arguments), of_dtype(np.dtype(thing)))
+        if isinstance(thing, type) and issubclass(thing, tuple) and hasattr(thing, "_fields"):
+            if len(arguments) != len(thing._fields):
+                raise Unsupported(f"{thing.__name__} takes {len(thing._fields)} values")
+            return Group(tuple(arguments), thing._fields)
+        if isinstance(thing, np.ufunc) and thing in FORMULAS:
+            return self._formula(FORMULAS[thing], arguments)
+        function = plain_function(thing)
+        if function is None:
+            raise Unsupported(f"{getattr(thing, '__name__', thing)!r} cannot be called in a kernel")
+        return self.call_function(thing, function, arguments)
+
+    def call_function(
+        self, thing: Any, function: types.FunctionType, arguments: Sequence[Value]
+    ) -> Value:
+        """The value of a call of another kernel."""
+        raise NotImplementedError
+
+    def _formula(self, name: str, arguments: Sequence[Value]) -> Value:
+        """An elementary function, by the project's own formula for the arguments' precision."""
+        from motes.kernel import ELEMENTARY
+
+        numbers = [self._real(a) for a in arguments]
+        precision = "single" if all(n.type.bits == 32 for n in numbers) else "double"
+        kind = NUMBERS["float32" if precision == "single" else "float64"]
+        kernel = ELEMENTARY[name].compiled(precision)
+        function = plain_function(kernel)
+        assert function is not None
+        return self.call_function(kernel, function, [self.cast(n, kind) for n in numbers])
+
+    def _number(self, *arguments: Value) -> Scalar:
+        if len(arguments) != 1 or not isinstance(arguments[0], Scalar):
+            raise Unsupported("a number is made of one number")
+        return arguments[0]
+
+    def _real(self, value: Value) -> Scalar:
+        number = self._number(value)
+        return number if number.type.kind == "f" else self.cast(number, DOUBLE)
+
+    def smallest(self, *arguments: Value) -> Value:
+        """min."""
+        return self._extreme("Lt", arguments)
+
+    def largest(self, *arguments: Value) -> Value:
+        """max."""
+        return self._extreme("Gt", arguments)
+
+    def _extreme(self, better: str, arguments: Sequence[Value]) -> Value:
+        if len(arguments) == 1 and isinstance(arguments[0], Group):
+            arguments = arguments[0].items
+        best = self._number(arguments[0])
+        for argument in arguments[1:]:
+            other = self._number(argument)
+            kind = self.together(best, other)
+            if best.type == other.type:
+                kind = best.type
+            bare = best.bare and other.bare
+            if best.literal is not None and other.literal is not None:
+                wins = other.literal < best.literal if better == "Lt" else None
+                wins = other.literal > best.literal if wins is None else wins
+                best = literal(other.literal if wins else best.literal, kind, bare)
+                continue
+            a, b = self.cast(best, kind), self.cast(other, kind)
+            picked = self.chosen(self.compare(better, b, a), b, a)
+            assert isinstance(picked, Scalar)
+            best = picked
+        return best
+
+    def magnitude(self, value: Value) -> Value:
+        """abs."""
+        number = self._number(value)
+        if number.literal is not None:
+            return literal(abs(number.literal), number.type, number.bare)
+        if number.type.kind == "f":
+            return self.intrinsic("fabs", number)
+        if number.type.kind == "u":
+            return number
+        return self.intrinsic("abs", self.cast(number, INT))
+
+    def whole_number(self, value: Value) -> Value:
+        """int: the integer towards 0."""
+        number = self._number(value)
+        unsigned = number.type.kind == "u"
+        return self.cast(number, NUMBERS["uint64"] if unsigned else INT)
+
+    def rounded_down(self, value: Value) -> Value:
+        """math.floor: an integer."""
+        return self.cast(self.intrinsic("floor", self._real(value)), INT)
+
+    def finite(self, value: Value) -> Value:
+        """numpy.isfinite."""
+        size = self.intrinsic("fabs", self._real(value))
+        return self.compare("Lt", size, literal(math.inf, size.type))
+
+    def not_a_number(self, value: Value) -> Value:
+        """numpy.isnan."""
+        number = self._real(value)
+        test = f"fcmp uno {number.type.llvm} {number.text}, {number.text}"
+        return Scalar(BOOL, self.do(test))
+
+    def length(self, value: Value) -> Value:
+        """len."""
+        if isinstance(value, View):
+            return Scalar(INT, value.shape[0])
+        if isinstance(value, Group):
+            return literal(len(value.items), INT, bare=True)
+        raise Unsupported("len of a number")
+
+    def numbered(self, value: Value) -> Value:
+        """enumerate, of a tuple."""
+        if not isinstance(value, Group):
+            raise Unsupported("enumerate of anything but a tuple")
+        pairs = enumerate(value.items)
+        return Group(tuple(Group((literal(k, INT, bare=True), item)) for k, item in pairs))
+
+    def bits_as(self, value: Scalar, kind: Number) -> Scalar:
+        """`value.view(type)`: the same bits as another type."""
+        if value.type.bits != kind.bits:
+            raise Unsupported(f"{value.type} and {kind} differ in size")
+        if value.type.llvm == kind.llvm:
+            return Scalar(kind, value.text)
+        return Scalar(kind, self.do(f"bitcast {value.type.llvm} {value.text} to {kind.llvm}"))
+
+    def empty(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
+        """numpy.empty: room that the call has for itself; its numbers are not set."""
+        item = of_dtype(np.dtype(_thing(kind)))
+        extents = shape.items if isinstance(shape, Group) else (shape,)
+        sizes = [self.cast(self._number(e), INT) for e in extents]
+        packed = Array(item, len(sizes), True)
+        texts = tuple(size.text for size in sizes)
+        known = [size.literal for size in sizes]
+        if None not in known and (total := math.prod(known)) <= ROOM:
+            return View(packed, self.room(item, max(total, 1)), texts)
+        bytes = str(item.bytes)
+        for text in texts:
+            bytes = self.do(f"mul nsw i64 {bytes}, {text}")
+        return View(packed, self.heap(bytes), texts)
+
+    def zeros(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
+        """numpy.zeros."""
+        array = self.empty(shape, kind)
+        assert isinstance(array, View)
+        self.fill(array, literal(0, array.type.item))
+        return array
+
+    def heap(self, bytes: str) -> str:
+        """Address of memory that is given back when the function returns."""
+        raise NotImplementedError
+
+
+def _thing(value: Value) -> Any:
+    if not isinstance(value, Known):
+        raise Unsupported(f"{type_of(value)} where a type is needed")
+    return value.thing
+
+
+def _intrinsic(name: str) -> Callable[..., Value]:
+    def call(self: Calls, value: Value) -> Value:
+        return self.intrinsic(name, self._real(value))
+
+    return call
+
+
+BUILT_IN: dict[Any, Callable[..., Value]] = {
+    min: Calls.smallest,
+    max: Calls.largest,
+    abs: Calls.magnitude,
+    np.abs: Calls.magnitude,
+    int: Calls.whole_number,
+    float: lambda self, value: self.cast(self._number(value), DOUBLE),
+    bool: lambda self, value: self.truth(value),
+    len: Calls.length,
+    math.floor: Calls.rounded_down,
+    np.isfinite: Calls.finite,
+    math.isfinite: Calls.finite,
+    np.isnan: Calls.not_a_number,
+    math.isnan: Calls.not_a_number,
+    np.empty: Calls.empty,
+    np.zeros: Calls.zeros,
+    math.sqrt: _intrinsic("sqrt"),
+    np.sqrt: _intrinsic("sqrt"),
+    np.floor: _intrinsic("floor"),
+    np.ceil: _intrinsic("ceil"),
+    np.trunc: _intrinsic("trunc"),
+    np.round: _intrinsic("roundeven"),
+    np.rint: _intrinsic("roundeven"),
+    enumerate: Calls.numbered,
+    math.fabs: _intrinsic("fabs"),
+}
+"""Handlers by the function itself."""
+
+FORMULAS = {
+    np.exp: "exp", np.log: "log", np.sin: "sin", np.cos: "cos", np.tanh: "tanh",
+    np.arctan2: "atan2", np.power: "pow",
+}  # fmt: skip
+"""NumPy's functions that the project has formulas for."""

@@ -1,0 +1,118 @@
+"""How Python calls machine code: arguments as numbers of 8 bytes in a row."""
+
+from __future__ import annotations
+
+import ctypes
+import struct
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from motes.machine.kinds import (
+    BOOL,
+    DOUBLE,
+    INT,
+    NOTHING,
+    Array,
+    Number,
+    Tuple,
+    Type,
+    Unsupported,
+    of_dtype,
+)
+
+_PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_char_p, ctypes.c_void_p)
+"""Calls through it release the interpreter's lock."""
+
+
+def spread(argument: Any, key: list[Any], numbers: list[Any]) -> None:
+    """Append what an argument's type follows from, and its numbers."""
+    kind = type(argument)
+    if kind is np.ndarray:
+        key.append((argument.dtype.num, argument.ndim, argument.flags.c_contiguous))
+        numbers.append(id(argument))
+    elif kind is tuple:
+        key.append(len(argument))
+        for item in argument:
+            spread(item, key, numbers)
+    elif kind is bool or kind is np.bool_:
+        key.append("?")
+        numbers.append(int(argument))
+    elif isinstance(argument, tuple):
+        key.append(kind)
+        for item in argument:
+            spread(item, key, numbers)
+    elif argument is None:
+        key.append(None)
+    else:
+        key.append(kind)
+        numbers.append(argument)
+
+
+def kind_of(argument: Any) -> Type:
+    """The type of an argument. Raises Unsupported for what kernels do not take."""
+    if isinstance(argument, np.ndarray):
+        return Array(of_dtype(argument.dtype), argument.ndim, argument.flags.c_contiguous)
+    if isinstance(argument, bool | np.bool_):
+        return BOOL
+    if isinstance(argument, np.generic):
+        return of_dtype(argument.dtype)
+    if isinstance(argument, int):
+        return INT
+    if isinstance(argument, float):
+        return DOUBLE
+    if isinstance(argument, tuple):
+        return Tuple(tuple(map(kind_of, argument)), tuple(getattr(argument, "_fields", ())))
+    if argument is None:
+        return NOTHING
+    raise Unsupported(f"{type(argument).__name__} is not taken by kernels")
+
+
+def letters(kind: Type) -> str:
+    """How `struct` packs a type's registers."""
+    if isinstance(kind, Number):
+        return "d" if kind.kind == "f" else "Q" if kind.kind == "u" else "q"
+    if isinstance(kind, Tuple):
+        return "".join(map(letters, kind.items))
+    if isinstance(kind, Array):
+        return "Q"
+    return ""
+
+
+def _taker(kind: Type) -> Callable[[list[Any]], Any]:
+    """A function that takes a result of a type from unpacked numbers."""
+    if isinstance(kind, Tuple):
+        parts = [_taker(item) for item in kind.items]
+        return lambda numbers: tuple(part(numbers) for part in parts)
+    if isinstance(kind, Number):
+        if kind == BOOL:
+            return lambda numbers: bool(numbers.pop() & 1)
+        return lambda numbers: numbers.pop()
+    if kind == NOTHING:
+        return lambda numbers: None
+    raise Unsupported("a kernel cannot return an array to Python")
+
+
+class Door:
+    """Machine code for one list of argument types."""
+
+    def __init__(self, address: int, kinds: Sequence[Type], result: Type) -> None:
+        self._function = _PROTOTYPE(address)
+        self._pack = struct.Struct("=" + "".join(map(letters, kinds))).pack
+        self._result = result
+        out = letters(result)
+        self._unpack = struct.Struct("=" + out).unpack
+        self._size = 8 * len(out)
+        self._take = _taker(result)
+
+    def __call__(self, numbers: Sequence[Any]) -> Any:
+        """Call with the numbers of all arguments."""
+        if not self._size:
+            self._function(self._pack(*numbers), None)
+            return None
+        room = ctypes.create_string_buffer(self._size)
+        self._function(self._pack(*numbers), room)
+        found = list(self._unpack(room.raw))
+        found.reverse()
+        return self._take(found)

@@ -1,0 +1,149 @@
+"""A module of LLVM's text: a kernel, all functions that it calls, and the door for Python."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Sequence
+from typing import Any
+
+from motes.machine.block import Writer
+from motes.machine.calls import plain_function
+from motes.machine.function import Function, returned
+from motes.machine.kinds import DOUBLE, INT, Array, Number, Tuple, Type, Unsupported
+from motes.machine.values import Scalar, register_types
+
+ENTRY = "motes_entry"
+"""Name of the function that Python calls: it reads arguments of 8 bytes each from memory."""
+
+PLAIN = "nounwind mustprogress"
+
+_WORD = 8
+_HEAD = object.__basicsize__
+FIELDS = {"data": _HEAD, "shape": _HEAD + 2 * _WORD, "strides": _HEAD + 3 * _WORD}
+"""Where NumPy's arrays (PyArrayObject_fields in its C interface) keep what a kernel needs."""
+
+
+class Module:
+    """Functions by what they are, with the types of their arguments."""
+
+    def __init__(self) -> None:
+        self.declarations: set[str] = set()
+        self._functions: dict[Any, tuple[str, Type] | None] = {}
+        self._texts: list[str] = []
+        self._memory: dict[Number, int] = {}
+
+    def function(
+        self, thing: Any, function: types.FunctionType, kinds: Sequence[Type], flags: Any
+    ) -> tuple[str, Type]:
+        """Name and type of the result of a function for arguments of given types.
+
+        `thing` is what is called: a kernel has flags of its own, a plain function those given.
+        """
+        flags = getattr(thing, "flags", flags if isinstance(flags, frozenset) else None)
+        flags = frozenset(flags.split()) if isinstance(flags, str) else flags
+        key = (function, flags, tuple(kinds))
+        if key in self._functions:
+            known = self._functions[key]
+            if known is None:
+                raise Unsupported(f"{function.__name__} calls itself")
+            return known
+        self._functions[key] = None
+        writer = Function(self, function, kinds, flags)
+        name = f"{function.__name__}.{len(self._functions)}"
+        inline = "alwaysinline" if getattr(thing, "inline", True) else "noinline"
+        self._texts.append(writer.text(name, f"{inline} {PLAIN}"))
+        self._functions[key] = name, writer.result
+        return name, writer.result
+
+    def kind_of_memory(self, item: Number) -> str:
+        """The mark of loads and stores of a type of number."""
+        number = self._memory.setdefault(item, len(self._memory))
+        return f", !tbaa !{2 * number + 2}"
+
+    def text(self, name: str, result: Type, kinds: Sequence[Type]) -> str:
+        """The module's text, with a door to one of its functions."""
+        tables = ['!0 = !{!"memory"}']
+        for item, number in self._memory.items():
+            first = 2 * number + 1
+            tables.append(f'!{first} = !{{!"{item.name}", !0, i64 0}}')
+            tables.append(f"!{first + 1} = !{{!{first}, !{first}, i64 0}}")
+        parts = [*sorted(self.declarations), *self._texts, door(name, result, kinds), *tables]
+        return "\n".join(parts)
+
+
+def door(name: str, result: Type, kinds: Sequence[Type]) -> str:
+    """A function of two addresses: the arguments, and where the result goes, 8 bytes a number.
+
+    An array comes as the address of NumPy's object, which is read here.
+    """
+    writer = Writer(frozenset())
+    place = 0
+
+    def argument(llvm: str) -> str:
+        nonlocal place
+        at = writer.do(f"getelementptr inbounds i64, ptr %from, i64 {place}")
+        place += 1
+        return writer.do(f"load {llvm}, ptr {at}")
+
+    def taken(kind: Type) -> list[str]:
+        if isinstance(kind, Number):
+            wide = "double" if kind.kind == "f" else "i64"
+            number = argument(wide)
+            if wide != kind.llvm:
+                step = "fptrunc" if kind.kind == "f" else "trunc"
+                number = writer.do(f"{step} {wide} {number} to {kind.llvm}")
+            return [number]
+        if isinstance(kind, Tuple):
+            return [register for item in kind.items for register in taken(item)]
+        if not isinstance(kind, Array):
+            return []
+        thing = argument("ptr")
+        found = [writer.do(f"load ptr, ptr {field(thing, 'data')}")]
+        for name in ("shape",) if kind.packed else ("shape", "strides"):
+            numbers = writer.do(f"load ptr, ptr {field(thing, name)}")
+            for axis in range(kind.axes):
+                at = writer.do(f"getelementptr inbounds i64, ptr {numbers}, i64 {axis}")
+                found.append(writer.do(f"load i64, ptr {at}"))
+        return found
+
+    def field(thing: str, name: str) -> str:
+        return writer.do(f"getelementptr inbounds i8, ptr {thing}, i64 {FIELDS[name]}")
+
+    passed = [
+        f"{llvm} {register}"
+        for kind in kinds
+        for llvm, register in zip(register_types(kind), taken(kind), strict=True)
+    ]
+    out = register_types(result)
+    call = f"call {returned(result)} @{name}({', '.join(passed)})"
+    whole = ""
+    if out:
+        whole = writer.do(call)
+    else:
+        writer.line(call)
+    for k, kind in enumerate(numbers_of(result)):
+        value = whole
+        if len(out) > 1:
+            value = writer.do(f"extractvalue {returned(result)} {whole}, {k}")
+        number = writer.cast(Scalar(kind, value), DOUBLE if kind.kind == "f" else INT)
+        at = writer.do(f"getelementptr inbounds i64, ptr %to, i64 {k}")
+        writer.line(f"store {number.type.llvm} {number.text}, ptr {at}")
+    body = "\n".join(writer.blocks[0].lines)
+    return (
+        f"define void @{ENTRY}(ptr noalias %from, ptr noalias %to) {PLAIN} {{\n{body}\nret void\n}}"
+    )
+
+
+def numbers_of(kind: Type) -> list[Number]:
+    """All numbers of a result, which holds no arrays."""
+    if isinstance(kind, Number):
+        return [kind]
+    return [n for item in kind.items for n in numbers_of(item)] if isinstance(kind, Tuple) else []
+
+
+def compiled_text(kernel: Any, kinds: Sequence[Type]) -> tuple[str, Type]:
+    """LLVM's text of a kernel for argument types, and the type of its result."""
+    module, function = Module(), plain_function(kernel)
+    assert function is not None
+    name, result = module.function(kernel, function, kinds, frozenset())
+    return module.text(name, result, kinds), result
