@@ -9,7 +9,7 @@ from motes.catalog import Number, Vector, component, quantity
 
 @component
 class Balls:
-    """A shaded ball for each particle: dark where it turns from the light, bright where it faces it.
+    """A shaded ball for each particle: bright where it faces the light, dark elsewhere.
 
     Four dots stand for Lambert's law: each is smaller, brighter and nearer to the light than the
     one below it. Give it an opacity of 1, and a camera on the side of the light.
