@@ -98,12 +98,13 @@ def particle_life(left: Any, right: Any) -> None:
     names, radius, rows = ("green", "red", "blue", "white"), 0.17, []
     sim = motes.Simulation(motes.load("particle_life"))
     kind = np.repeat(np.arange(4), [sim[name].position.shape[0] for name in names])
-    for number, _ in enumerate(sim.frames(last=200)):
+    for number, _ in enumerate(sim.frames(last=90)):
         if number % EVERY == 0:
             x = np.concatenate([sim[name].position for name in names])
             i, j = motes.neighbours.pairs(x, radius)
+            i, j = np.concatenate([i, j]), np.concatenate([j, i])  # Each pair from both ends.
             same = [np.mean(kind[j][kind[i] == k] == k) for k in range(4)]
-            rows.append((sim.time, 2 * len(i) / len(x), *same))
+            rows.append((sim.time, len(i) / len(x), *same))
     time, near, *same = np.transpose(rows)
     left.plot(time, near, label=f"neighbours within {radius} m")
     left.set(xlabel="time [s]")
