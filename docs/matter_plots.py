@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +83,7 @@ def granular(left: Any, right: Any) -> None:
     x = np.concatenate([sim[name].position for name in names])
     away = np.hypot(x[:, 0] + 0.1, x[:, 1] - 0.1)
     edges = np.linspace(0, 0.5, 9)
-    rings = [x[(away >= a) & (away < b), 2] for a, b in zip(edges, edges[1:], strict=False)]
+    rings = [x[(away >= a) & (away < b), 2] for a, b in pairwise(edges)]
     middle, top = (edges[1:] + edges[:-1]) / 2, np.array([np.percentile(z, 97) for z in rings])
     slope, begin = np.polyfit(middle[2:], top[2:], 1)
     angle = np.degrees(np.arctan(-slope))
