@@ -53,12 +53,12 @@ def splash(left: Any, right: Any) -> None:
     """Energy and height of the drop; the fluid's density over height."""
     rows = []
     sim = motes.Simulation(motes.load("lj_splash"))
-    for number, _ in enumerate(sim.frames()):
+    for number, _ in enumerate(sim.frames(last=200)):
         drop = sim["drop"]
         if number % EVERY == 0:
             kinetic = (drop.velocity.astype(float) ** 2).sum(axis=1).mean() / 2
             rows.append((sim.time, kinetic, drop.position[:, 2].mean()))
-        if number in (10, 130, 280):
+        if number in (0, 110, 195):
             height = np.concatenate([sim[name].position[:, 2] for name in ("pool", "drop")])
             count, edges = np.histogram(height, np.arange(0, 26, 0.5))
             right.plot(
@@ -98,12 +98,13 @@ def particle_life(left: Any, right: Any) -> None:
     names, radius, rows = ("green", "red", "blue", "white"), 0.17, []
     sim = motes.Simulation(motes.load("particle_life"))
     kind = np.repeat(np.arange(4), [sim[name].position.shape[0] for name in names])
-    for number, _ in enumerate(sim.frames()):
+    for number, _ in enumerate(sim.frames(last=90)):
         if number % EVERY == 0:
             x = np.concatenate([sim[name].position for name in names])
             i, j = motes.neighbours.pairs(x, radius)
+            i, j = np.concatenate([i, j]), np.concatenate([j, i])  # Each pair from both ends.
             same = [np.mean(kind[j][kind[i] == k] == k) for k in range(4)]
-            rows.append((sim.time, 2 * len(i) / len(x), *same))
+            rows.append((sim.time, len(i) / len(x), *same))
     time, near, *same = np.transpose(rows)
     left.plot(time, near, label=f"neighbours within {radius} m")
     left.set(xlabel="time [s]")
