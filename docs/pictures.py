@@ -30,6 +30,9 @@ INSTANTS = {
     "evacuation": 0.3,
     "fireworks": 0.75,
     "fountain": 0.9,
+    "granular": 0.65,
+    "lj_melting": 0.42,
+    "lj_splash": 0.45,
     "plummer": 0.1,
     "ring": 0.4,
 }

@@ -92,7 +92,8 @@ class Studio:
         look = next(s.look for s in self.scene.systems if s.name == name)
         figure = type(look).kernel("figure")
         if figure is not None:
-            p = SimpleNamespace(upright=vars(type(look))["upright"])
+            own = vars(type(look))
+            p = SimpleNamespace(upright=own["upright"], rate=own.get("rate", 0.0))
             for key in look.own:
                 value = look.values[key].at(time)
                 setattr(p, key, float(value[0]) if value.size == 1 else value)

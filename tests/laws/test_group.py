@@ -101,7 +101,3 @@ def test_groups_are_named_right() -> None:
     other = motes.System("dust", emit=[emitter], integrator="euler")
     with pytest.raises(motes.SceneError, match="one integrator"):
         motes.Simulation(motes.Scene(systems=[system, other], interact=[Pull()]))
-    with pytest.raises(motes.SceneError, match="collides = false"):
-        motes.Simulation(
-            motes.Scene(systems=[system], interact=[Pull()], solid=[motes.solid.Plane()])
-        )

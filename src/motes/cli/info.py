@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from motes.cli.options import json_option
 from motes.cli.progress import rounded
-from motes.record.energy import Measures, to_json
+
+if TYPE_CHECKING:
+    from motes.record.energy import Measures
 
 
 @click.command(short_help="Show what kept frames hold.")
@@ -20,6 +22,7 @@ from motes.record.energy import Measures, to_json
 def command(folder: Path, as_json: bool) -> None:
     """Show which frames FOLDER keeps, of which scene, and what is in them."""
     from motes.production import open_frames
+    from motes.record.energy import to_json
 
     store = open_frames(folder)
     manifest, numbers = store.manifest, store.numbers()

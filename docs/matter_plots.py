@@ -1,0 +1,137 @@
+"""Plot the physics of the gallery's matter to docs/pictures: python3 docs/matter_plots.py [NAME].
+
+Needs matplotlib; takes about two minutes.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+import motes
+
+FOLDER = Path(__file__).resolve().parent / "pictures"
+EVERY = 4
+"""Frames from one measured instant to the next."""
+
+
+def melting(left: Any, right: Any) -> None:
+    """Temperature and potential energy of a melt; pairs at a distance before and after."""
+    sim = motes.matter.lj_melt(cells=8)
+    box = sim.scene.periodic.size
+    rows = []
+    right.plot(*motes.matter.radial_distribution(crystal(sim), box, 4.5, 150), label="crystal")
+    for _ in range(60):
+        state = motes.matter.thermo(sim)
+        rows.append((sim.time, state.temperature, -state.potential / 5, state.total))
+        sim.run(steps=10)
+    time, temperature, potential, _ = np.transpose(rows)
+    left.plot(time, temperature, label="temperature")
+    left.plot(time, potential, label="-potential / 5, per atom")
+    left.set(xlabel="time", ylabel="reduced units")
+    x = sim["atoms"].position
+    right.plot(*motes.matter.radial_distribution(x, box, 4.5, 150), label="liquid")
+    right.set(xlabel="distance / sigma", ylabel="g(r)", ylim=(0, 8))
+
+
+def crystal(sim: motes.Simulation) -> Any:
+    """Places after a few steps, when the lattice is whole and its atoms tremble."""
+    sim.run(steps=10)
+    return sim["atoms"].position
+
+
+def splash(left: Any, right: Any) -> None:
+    """Energy and height of the drop; the fluid's density over height."""
+    rows = []
+    sim = motes.Simulation(motes.load("lj_splash"))
+    for number, _ in enumerate(sim.frames()):
+        drop = sim["drop"]
+        if number % EVERY == 0:
+            kinetic = (drop.velocity.astype(float) ** 2).sum(axis=1).mean() / 2
+            rows.append((sim.time, kinetic, drop.position[:, 2].mean()))
+        if number in (10, 130, 280):
+            height = np.concatenate([sim[name].position[:, 2] for name in ("pool", "drop")])
+            count, edges = np.histogram(height, np.arange(0, 26, 0.5))
+            right.plot(
+                (edges[1:] + edges[:-1]) / 2, count / (0.5 * 36**2), label=f"t = {sim.time:.1f}"
+            )
+    time, kinetic, height = np.transpose(rows)
+    left.plot(time, kinetic, label="kinetic energy per atom of the drop")
+    left.plot(time, height / 5, label="mean height of the drop / 5")
+    left.set(xlabel="time", ylabel="reduced units")
+    right.set(xlabel="height / sigma", ylabel="number density", yscale="log")
+
+
+def granular(left: Any, right: Any) -> None:
+    """Kinetic energy of the grains, which collisions use up; the heap's surface."""
+    sim, names, rows = motes.Simulation(motes.load("granular")), ("first", "second", "third"), []
+    for number, _ in enumerate(sim.frames()):
+        if number % EVERY == 0:
+            v = np.concatenate([sim[name].velocity for name in names]).astype(float)
+            rows.append((sim.time, (v**2).sum(axis=1).mean() / 2 if len(v) else np.nan))
+    left.semilogy(*np.transpose(rows), label="kinetic energy per kilogram")
+    left.set(xlabel="time [s]", ylabel="J/kg")
+    x = np.concatenate([sim[name].position for name in names])
+    away = np.hypot(x[:, 0] + 0.1, x[:, 1] - 0.1)
+    edges = np.linspace(0, 0.5, 9)
+    rings = [x[(away >= a) & (away < b), 2] for a, b in pairwise(edges)]
+    middle, top = (edges[1:] + edges[:-1]) / 2, np.array([np.percentile(z, 97) for z in rings])
+    slope, begin = np.polyfit(middle[2:], top[2:], 1)
+    angle = np.degrees(np.arctan(-slope))
+    print(f"granular: {len(x)} grains, slope {angle:.1f} degrees")
+    right.plot(middle, top, "o", label="surface")
+    right.plot(middle, begin + slope * middle, label=f"{angle:.0f} degrees")
+    right.set(xlabel="distance from the jet [m]", ylabel="height [m]")
+
+
+def particle_life(left: Any, right: Any) -> None:
+    """Particles near a particle over time; the share of each kind that is near its own."""
+    names, radius, rows = ("green", "red", "blue", "white"), 0.17, []
+    sim = motes.Simulation(motes.load("particle_life"))
+    kind = np.repeat(np.arange(4), [sim[name].position.shape[0] for name in names])
+    for number, _ in enumerate(sim.frames()):
+        if number % EVERY == 0:
+            x = np.concatenate([sim[name].position for name in names])
+            i, j = motes.neighbours.pairs(x, radius)
+            same = [np.mean(kind[j][kind[i] == k] == k) for k in range(4)]
+            rows.append((sim.time, 2 * len(i) / len(x), *same))
+    time, near, *same = np.transpose(rows)
+    left.plot(time, near, label=f"neighbours within {radius} m")
+    left.set(xlabel="time [s]")
+    for name, share in zip(names, same, strict=True):
+        colour = "0.6" if name == "white" else name
+        right.plot(time, share, color=colour, label=name)
+    right.set(xlabel="time [s]", ylabel="share of neighbours of the same kind")
+
+
+PLOTS: dict[str, Callable[[Any, Any], None]] = {
+    "melting": melting,
+    "splash": splash,
+    "granular": granular,
+    "particle_life": particle_life,
+}
+
+
+def main(names: list[str]) -> None:
+    """Draw the named plots, or all."""
+    for name in names or PLOTS:
+        figure, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
+        PLOTS[name](*axes)
+        for one in axes:
+            one.legend(frameon=False)
+            one.spines[["top", "right"]].set_visible(False)
+        figure.savefig(FOLDER / f"matter_{name}.png", dpi=90)
+        plt.close(figure)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
