@@ -99,25 +99,29 @@ class Kernel:
 
     def bind(self, *arguments: Any) -> Callable[..., Any]:
         """The kernel with its first arguments given, so that many calls take them apart once."""
-        from motes.machine.door import spread
+        from motes.machine.door import PLAIN, spread
 
         head: list[Any] = []
         given: list[Any] = []
         for argument in arguments:
             spread(argument, head, given)
-        doors: dict[tuple[Any, ...], Any] = {}
+        known: dict[tuple[type, ...], Callable[..., Any]] = {}
 
         def bound(*rest: Any) -> Any:
-            key: list[Any] = []
-            numbers = given.copy()
+            key = tuple(map(type, rest))
+            call = known.get(key)
+            if call is not None:
+                return call(*rest)
+            found, numbers = head.copy(), given.copy()
             for argument in rest:
-                spread(argument, key, numbers)
-            door = doors.get(tuple(key))
-            if door is None:
-                whole = (*head, *key)
-                door = self._doors.get(whole) or self._open(whole, (*arguments, *rest))
-                doors[tuple(key)] = door
-            return door(numbers) if door is not self else self.dispatcher(*arguments, *rest)
+                spread(argument, found, numbers)
+            whole = tuple(found)
+            door = self._doors.get(whole) or self._open(whole, (*arguments, *rest))
+            if door is self:
+                return self.dispatcher(*arguments, *rest)
+            if PLAIN.issuperset(key):
+                known[key] = door.given(given)
+            return door(numbers)
 
         return bound
 

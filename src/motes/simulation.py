@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from motes.appearance import Look
-from motes.capture import CAPTURE
 from motes.catalog import Component, find
 from motes.compile.motion import Motion
 from motes.compile.system import CompiledSystem
@@ -19,9 +18,10 @@ from motes.emission import Clock
 from motes.errors import SceneError, SimulationError, likely
 from motes.frame import Frame
 from motes.group import Group, named_systems
+from motes.group.capture import CAPTURE
+from motes.group.lasting import Lasting
 from motes.integrate import method
 from motes.interact.arrange import Box, wrapped
-from motes.nearby import Lasting
 from motes.philox import channel
 from motes.record.energy import Matter, Measures, measure
 from motes.scene.address import component_address

@@ -8,6 +8,7 @@ another that it could feel.
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,6 +60,7 @@ class Stepper:
         self.system, self.clocks, self.capacity = system, clocks, capacity
         self.seed = np.uint64(seed)
         self.flags: NDArray[np.uint8] = np.zeros(0, np.uint8)
+        self._steps: dict[Any, tuple[tuple[Any, ...], Any]] = {}
         self.impacts = 0
 
     def step(self, rows: Particles, interval: Interval) -> None:
@@ -154,19 +156,28 @@ class Stepper:
         parts = _parts(last - first, 1)
         found = [NOTHING] * len(parts)
 
-        step = bound(
-            kernel, rows.position, rows.velocity, rows.birth, rows.columns, flags, self.system.K,
-            interval.begin, interval.end,
-        )  # fmt: skip
+        step = self._bound(kernel, rows)
 
         def straight(k: int) -> None:
             low, high = first + parts[k][0], first + parts[k][1]
-            step(low, high)
+            step(interval.begin, interval.end, low, high)
             if self.system.surfaces is not None:
                 found[k] = _marked(flags, low, high)
 
         share(straight, len(parts))
         return np.concatenate([NOTHING, *found])
+
+    def _bound(self, kernel: Any, rows: Particles) -> Any:
+        """A kernel with the arrays that it works on, which are the same from step to step until
+        there are more rows than they hold."""
+        arrays = (
+            rows.position, rows.velocity, rows.birth, rows.columns, self._flags(rows),
+            self.system.K,
+        )  # fmt: skip
+        known = self._steps.get(kernel)
+        if known is None or not all(map(operator.is_, arrays, known[0])):
+            known = self._steps[kernel] = arrays, bound(kernel, *arrays)
+        return known[1]
 
     def exceptions(
         self, rows: Particles, exceptional: NDArray[np.int64], interval: Interval

@@ -9,8 +9,8 @@ import pytest
 
 import motes
 from motes.catalog import component, quantity
+from motes.group.nearby import Nearby
 from motes.kernel import kernel
-from motes.nearby import Nearby
 
 
 @component(kind="interact", name="test_cushion")

@@ -10,7 +10,7 @@ import numpy as np
 from motes.catalog import Number, component, quantity
 
 if TYPE_CHECKING:
-    from motes.capture import Animals
+    from motes.group.capture import Animals
 
 
 @component

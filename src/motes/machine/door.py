@@ -26,28 +26,57 @@ _PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_char_p, ctypes.c_void_p)
 """Calls through it release the interpreter's lock."""
 
 
+PLAIN = frozenset({int, float, *(np.dtype(letter).type for letter in "bBhHiIlLqQfd")})
+"""Types of arguments that go to machine code as the numbers that they are."""
+
+
 def spread(argument: Any, key: list[Any], numbers: list[Any]) -> None:
-    """Append what an argument's type follows from, and its numbers."""
+    """Append what an argument's type follows from, and its numbers.
+
+    Every call goes through it, so that it takes arrays and numbers, the usual arguments, first.
+    """
     kind = type(argument)
     if kind is np.ndarray:
-        key.append((argument.dtype.num, argument.ndim, argument.flags.c_contiguous))
+        key += (argument.dtype, argument.ndim, argument.flags.c_contiguous)
         numbers.append(id(argument))
-    elif kind is tuple:
-        key.append(len(argument))
-        for item in argument:
-            spread(item, key, numbers)
-    elif kind is bool or kind is np.bool_:
-        key.append("?")
-        numbers.append(int(argument))
-    elif isinstance(argument, tuple):
+    elif kind in PLAIN:
         key.append(kind)
-        for item in argument:
-            spread(item, key, numbers)
+        numbers.append(argument)
+    elif isinstance(argument, tuple):
+        known = _apart.get(id(argument)) or _taken_apart(argument)
+        key.append(known[1])
+        numbers += known[2]
+    elif kind is bool or kind is np.bool_:
+        key.append(bool)
+        numbers.append(int(argument))
     elif argument is None:
         key.append(None)
     else:
         key.append(kind)
         numbers.append(argument)
+
+
+SMALL = 1 << 16
+"""Bytes of arrays below which a tuple of them is remembered."""
+
+_Apart = tuple[tuple[Any, ...], tuple[Any, ...], list[Any]]
+_apart: dict[int, _Apart] = {}
+"""Tuples that came, by their identity, with their key and numbers: the constants of kernels, which
+come with every call. They are kept so that no other tuple takes their place, so only small ones."""
+
+
+def _taken_apart(argument: tuple[Any, ...]) -> _Apart:
+    key: list[Any] = [type(argument)]
+    numbers: list[Any] = []
+    for item in argument:
+        spread(item, key, numbers)
+    known = argument, tuple(key), numbers
+    sizes = [item.nbytes if type(item) is np.ndarray else SMALL for item in argument]
+    if sum(sizes) < SMALL:
+        if len(_apart) >= 256:
+            _apart.clear()
+        _apart[id(argument)] = known
+    return known
 
 
 def kind_of(argument: Any) -> Type:
@@ -99,7 +128,8 @@ class Door:
 
     def __init__(self, address: int, kinds: Sequence[Type], result: Type) -> None:
         self._function = _PROTOTYPE(address)
-        self._pack = struct.Struct("=" + "".join(map(letters, kinds))).pack
+        self._letters = "".join(map(letters, kinds))
+        self._pack = struct.Struct("=" + self._letters).pack
         self._result = result
         out = letters(result)
         self._unpack = struct.Struct("=" + out).unpack
@@ -116,3 +146,12 @@ class Door:
         found = list(self._unpack(room.raw))
         found.reverse()
         return self._take(found)
+
+    def given(self, numbers: Sequence[Any]) -> Callable[..., Any]:
+        """Calls with the first numbers given, which are packed only once."""
+        if self._size:
+            return lambda *rest: self((*numbers, *rest))
+        function, count = self._function, len(numbers)
+        packed = struct.pack("=" + self._letters[:count], *numbers)
+        pack = struct.Struct("=" + self._letters[count:]).pack
+        return lambda *rest: function(packed + pack(*rest), None)

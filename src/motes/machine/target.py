@@ -13,7 +13,7 @@ from llvmlite import binding
 
 from motes.machine.module import ENTRY
 
-LEVEL = 2
+LEVEL = 3
 
 
 @cache

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from motes.integrate import table as find
 from motes.ode import explicit, implicit, right_hand_side
 from motes.ode.arithmetic import Array
-from motes.ode.implicit import EXACTLY
+from motes.ode.implicit_frame import EXACTLY
 from motes.ode.jacobian import Newton, NewtonKey
 from motes.ode.march import Control
 from motes.ode.run import Machine, March, as_events, asked, checked, ends, fixed

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from motes.catalog import Flag, Integer, Number, component, quantity
 
 if TYPE_CHECKING:
-    from motes.constrain import Walkers
+    from motes.group.constrain import Walkers
 
 
 @component(kind="interact", name="crowd")

@@ -1,0 +1,201 @@
+"""A group: systems that feel each other and therefore take every stage of a step together.
+
+Advancing one system, or one particle, through a whole step before the next is a known way to lose
+momentum and order. Here each stage is evaluated for the whole group before the next begins.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.catalog import Component
+from motes.compile.pairs import Law
+from motes.errors import SceneError
+from motes.group.capture import Captures
+from motes.group.constrain import Constraints, Ground
+from motes.group.lasting import Body, Lasting
+from motes.group.members import Bodies, Member, Movers, Occasion
+from motes.group.methods import implicit_stages, runge_kutta, split
+from motes.group.nearby import Nearby
+from motes.group.partners import Interactions, having, kernel, named, partners, values
+from motes.interact.arrange import Box
+from motes.state import Particles
+from motes.step import Interval, Stepper
+from motes.tableau import Implicit, Splitting
+
+
+class Group:
+    """Steps systems that interact."""
+
+    def __init__(
+        self,
+        steppers: dict[str, Stepper],
+        interactions: Interactions,
+        precision: str,
+        strict: bool,
+        periodic: Box,
+        solids: Interactions = (),
+    ) -> None:
+        self.steppers = steppers
+        self.interactions = having(interactions, "accelerations")
+        self.exchanges = having(interactions, "exchange")
+        self._local = having(interactions, "reach")
+        laws = having(interactions, "velocities")
+        self.constraints = Constraints(laws, Ground(solids if laws else ()))
+        self.captures = Captures(having(interactions, "captures"))
+        self._strict, self._periodic = strict, periodic
+        self.nearby = self._nearby(precision)
+        motions = [stepper.system.motion for stepper in steppers.values()]
+        self.method = motions[0].method
+        who = f"systems {', '.join(steppers)} interact"
+        if any(motion.method is not self.method for motion in motions):
+            raise SceneError(f"{who} and must have one integrator.")
+        if laws and not isinstance(self.method, Splitting):
+            raise SceneError(
+                f'{who} by "{laws[0][1].name}", a law of velocities, which holds between kick and '
+                'drift: choose integrator = "semi_implicit_euler" or another splitting method.'
+            )
+        if not all(motion.inertial for motion in motions):
+            raise SceneError(f"{who} and must have velocities: give them a force besides flows.")
+
+    def _nearby(self, precision: str) -> Nearby:
+        laws = []
+        for address, part in self._local:
+            partners = named(part, "systems", self.steppers)
+            targets = named(part, "targets", self.steppers, partners)
+            sources = named(part, "sources", self.steppers, partners)
+            laws.append((Law(address, part, precision, self._strict), targets, sources))
+        real = np.float32 if precision == "single" else np.float64
+        return Nearby(laws, real, self._periodic)
+
+    @cached_property
+    def _measured(self) -> Nearby:
+        """The laws of limited reach in double precision, to measure with."""
+        return self._nearby("double")
+
+    def step(self, systems: dict[str, Particles], interval: Interval, memory: Lasting) -> None:
+        """Take all systems through one step, in place."""
+        alive = {name: s.births(systems[name], interval) for name, s in self.steppers.items()}
+        kept = {name: (alive[name], systems[name].deaths) for name in alive}
+        if memory.kept != kept:
+            memory.kept, memory.push = kept, None
+        self.nearby.settle(self._bodies(systems, alive, interval.begin), memory)
+        members = {name: self._member(name, systems[name], alive[name]) for name in alive}
+        if isinstance(self.method, Splitting):
+            split(self, members, interval, self.method, memory)
+        elif isinstance(self.method, Implicit):
+            implicit_stages(self, members, interval, self.method, memory)
+        else:
+            runge_kutta(self, members, interval, self.method, memory)
+        for name, stepper in self.steppers.items():
+            if stepper.system.surfaces is not None:
+                if stepper.rebounds(systems[name], members[name].y, alive[name], interval):
+                    memory.push = None
+                systems[name].motion[:, : alive[name]] = members[name].y
+        for address, part in self.exchanges:
+            self._exchange(address, part, members, interval, memory)
+        seed = next(iter(self.steppers.values())).seed
+        span = (interval.begin, interval.end)
+        self.captures.find(systems, span, seed, alive, values)
+        for name, stepper in self.steppers.items():
+            newborn = np.arange(alive[name], systems[name].count)
+            stepper.exceptions(systems[name], newborn, interval)
+            stepper.events()
+            rows, caught = systems[name], self.captures.rows(name)
+            stepper.deaths(rows, np.arange(rows.count), interval, caught)
+
+    def _bodies(
+        self, systems: dict[str, Particles], alive: dict[str, int], time: float
+    ) -> dict[str, Body]:
+        found = {}
+        for name, stepper in self.steppers.items():
+            rows, n = systems[name], alive[name]
+            found[name] = Body(stepper, rows, n, rows.position[:, :n], rows.velocity[:, :n], time)
+        return found
+
+    def _member(self, name: str, rows: Particles, alive: int) -> Member:
+        stepper = self.steppers[name]
+        y = rows.motion if stepper.system.surfaces is None else rows.motion[:, :alive].copy()
+        return Member(stepper, rows, alive, y, np.zeros((3, 0), rows.real))
+
+    def interact(self, members: dict[str, Member], time: float, memory: Lasting) -> None:
+        """Give every member the push of the interactions at a time.
+
+        What was summed up last holds as long as nothing has moved: the end of one step of the
+        leapfrog is the begin of the next.
+        """
+        if memory.push is None or memory.time != time or self.nearby.depends_on_velocity:
+            memory.push = self._pushes(members, time, memory)
+            memory.time = time
+        for name, member in members.items():
+            member.push = memory.push[name]
+
+    def _pushes(
+        self, members: dict[str, Member], time: float, memory: Lasting
+    ) -> dict[str, NDArray[Any]]:
+        pushes = {name: np.zeros((3, m.alive), m.y.dtype) for name, m in members.items()}
+        if self.interactions:
+            bodies = [
+                Bodies(
+                    name, np.ascontiguousarray(m.y[:3, : m.alive]), m.stepper.mass(m.rows, m.alive)
+                )
+                for name, m in members.items()
+            ]
+            for _, interaction in self.interactions:
+                chosen, p = partners(interaction, bodies), values(interaction, time)
+                found = kernel(interaction, "accelerations")(p, chosen)
+                for body, push in zip(chosen, found, strict=True):
+                    pushes[body.name] += push
+        if self._local:
+            near = {name: member.body(time) for name, member in members.items()}
+            self.nearby.push(near, pushes, memory)
+        return pushes
+
+    def _exchange(
+        self,
+        address: str,
+        part: Component,
+        members: dict[str, Member],
+        interval: Interval,
+        memory: Lasting,
+    ) -> None:
+        """Let particles exchange motion at a step's end."""
+        p, chosen = values(part, interval.end), named(part, "systems", members)
+        movers, seed = [], 0
+        for name in chosen:
+            member = members[name]
+            rows, n, stepper = member.rows, member.alive, member.stepper
+            mass, seed = stepper.mass(rows, n), int(stepper.seed)
+            size = stepper.trait("size", rows, n, interval.end)
+            x, v = rows.position[:, :n], rows.velocity[:, :n]
+            movers.append(Movers(name, x, v, mass, size, rows.ids[:n]))
+        when = Occasion(interval.length, memory.steps, address, seed, self._periodic)
+        if kernel(part, "exchange")(p, movers, when):
+            memory.push = None
+
+    def energy(self, systems: dict[str, Particles], time: float) -> float:
+        """Potential energy [J] of the interactions that define one."""
+        bodies = []
+        for name, stepper in self.steppers.items():
+            rows = systems[name]
+            place = rows.position[:, : rows.count]
+            bodies.append(Bodies(name, place, stepper.mass(rows, rows.count)))
+        far = sum(
+            float(kernel(part, "energy")(values(part, time), partners(part, bodies)))
+            for _, part in self.interactions
+            if type(part).kernel("energy") is not None
+        )
+        return far + (self._measured.energy(self._all(systems, time)) if self._local else 0.0)
+
+    def virial(self, systems: dict[str, Particles], time: float) -> NDArray[np.float64]:
+        """Sums r_i f_j over the pairs of pair laws: xx, yy, zz, xy, xz, yz (6,) [J]."""
+        if not self._local:
+            return np.zeros(6)
+        return self._measured.virial(self._all(systems, time))
+
+    def _all(self, systems: dict[str, Particles], time: float) -> dict[str, Body]:
+        return self._bodies(systems, {name: systems[name].count for name in self.steppers}, time)

@@ -1,0 +1,136 @@
+"""What a group keeps from step to step: neighbour lists, and what was last summed up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.compile.pairs import Law
+from motes.control.curve import Curve
+from motes.interact.arrange import Arranged, Box
+from motes.interact.clusters import Part
+from motes.state import Particles
+from motes.step import Stepper
+
+CAUTION = 1 - 2.0**-10
+"""Share of the allowed way after which a list is stale: more than rounding takes away."""
+
+
+@dataclass
+class Body:
+    """One system of a group at one stage: `position`, `velocity` (3, n) [m, m/s], its traits."""
+
+    stepper: Stepper
+    rows: Particles
+    alive: int
+    position: NDArray[Any]
+    velocity: NDArray[Any]
+    time: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Name of the system."""
+        return self.rows.name
+
+    @property
+    def mass(self) -> NDArray[Any]:
+        """Masses (n,) [kg]."""
+        return self.stepper.mass(self.rows, self.alive)
+
+    def lasts(self, name: str) -> bool:
+        """Whether a number of every particle never changes."""
+        traits = self.stepper.system.motion.traits
+        return name in traits and not isinstance(traits[name][1], Curve)
+
+    def column(self, name: str) -> NDArray[Any]:
+        """A number of every particle: v and an axis, or a trait."""
+        if name in ("vx", "vy", "vz"):
+            axis: NDArray[Any] = self.velocity["xyz".index(name[1])]
+            return axis
+        return self.stepper.trait(name, self.rows, self.alive, self.time)
+
+
+@dataclass(frozen=True)
+class Lists:
+    """The neighbour lists of laws that share them."""
+
+    radius: float
+    """What is within it is listed [m]."""
+    arranged: dict[str, Arranged]
+    near: dict[tuple[str, str], list[Part]]
+    """Lists by target and source."""
+    kept: dict[str, tuple[int, int]]
+    """Rows and deaths for which they hold."""
+    step: int = 0
+    """Number of the step in which they were built."""
+    columns: dict[tuple[str, str], NDArray[Any]] = field(default_factory=dict)
+    """What does not change while they hold, by system and name, in the order of slots."""
+    settled: bool = False
+    """Whether rows are in the order of cells."""
+
+
+@dataclass
+class Lasting:
+    """What a group keeps from step to step: lists, and what was last summed up."""
+
+    lists: list[Lists | None] = field(default_factory=list)
+    push: dict[str, NDArray[Any]] | None = None
+    """Accelerations (3, n) of all systems at `time`, while nothing has moved since."""
+    time: float = 0.0
+    kept: dict[str, tuple[int, int]] = field(default_factory=dict)
+    builds: int = 0
+    """How often lists were built."""
+    untidy: set[str] = field(default_factory=set)
+    """Systems whose rows are scattered, to be moved before the next step."""
+    steps: int = 0
+    """How many steps were begun."""
+
+    def copy(self) -> Lasting:
+        """A copy that shares arrays, which are replaced and never written to."""
+        return replace(self, lists=list(self.lists), untidy=set(self.untidy))
+
+    def arrays(self) -> Iterator[NDArray[Any]]:
+        """Everything that can change the next bit."""
+        for part in self.lists:
+            for arranged in part.arranged.values() if part else ():
+                yield from (arranged.order, arranged.real.position)
+        yield from (self.push or {}).values()
+
+
+@dataclass
+class Class:
+    """Laws that share lists, with the systems that each acts on and feels."""
+
+    laws: list[tuple[Law, tuple[str, ...], tuple[str, ...]]]
+
+    @property
+    def pairs(self) -> list[tuple[str, str]]:
+        """Targets and sources for which lists are needed."""
+        found = {(a, b) for _, targets, sources in self.laws for a in targets for b in sources}
+        return sorted(found)
+
+    @property
+    def systems(self) -> list[str]:
+        """Systems that take part."""
+        return sorted({name for pair in self.pairs for name in pair})
+
+    def reach(self, time: float) -> float:
+        """The longest reach at a time [m]."""
+        return max(law.reach(time) for law, _, _ in self.laws)
+
+    def radius(self, time: float, periodic: Box) -> float:
+        """Radius of lists that are built at a time [m]."""
+        wanted = max(
+            law.reach(time) * (1 + float(law.values(time)["skin"])) for law, _, _ in self.laws
+        )
+        return min(wanted, 0.999 * periodic.shortest)
+
+    def stale(self, found: Lists, moved: float, time: float, step: int) -> bool:
+        """Whether lists may miss a pair after particles have moved [m], or were to last shorter."""
+        if every := min(law.rebuild for law, _, _ in self.laws):
+            return step - found.step >= every or not np.isfinite(moved)
+        return not 2 * moved <= (found.radius - self.reach(time)) * CAUTION

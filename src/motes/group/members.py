@@ -1,0 +1,82 @@
+"""Who takes part in a group's step, as its methods, interactions and exchanges see them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.group.lasting import Body
+from motes.interact.arrange import Box
+from motes.jit import blocks, share
+from motes.state import Particles
+from motes.step import Stepper
+
+BLOCK = 1 << 14
+"""Rows of one kernel call."""
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """What an interaction sees of one system: `position` (3, n) [m] and `mass` (n,) [kg]."""
+
+    name: str
+    position: NDArray[Any]
+    mass: NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Movers:
+    """What an exchange sees of one system and may change: its rows' positions and velocities."""
+
+    name: str
+    position: NDArray[Any]
+    """(3, n) [m]"""
+    velocity: NDArray[Any]
+    """(3, n) [m/s]"""
+    mass: NDArray[Any]
+    """(n,) [kg]"""
+    size: NDArray[Any]
+    """(n,) diameters [m]"""
+    ids: NDArray[np.uint64]
+
+
+@dataclass(frozen=True)
+class Occasion:
+    """When an exchange happens: at the end of a step of a length [s], in a box, at an address."""
+
+    length: float
+    step: int
+    address: str
+    seed: int
+    periodic: Box
+
+
+@dataclass
+class Member:
+    """One system of the group during a step: state y (6, capacity) and push (3, n)."""
+
+    stepper: Stepper
+    rows: Particles
+    alive: int
+    y: NDArray[Any]
+    """The particles' own positions and velocities, or a copy where a flight has to be kept."""
+    push: NDArray[Any]
+
+    def each(self, name: str, *arguments: Any) -> None:
+        """Run one of the system's staged kernels over all rows that were alive."""
+        kernel = self.stepper.system.staged(name)
+        columns, parts = (self.rows.birth, self.rows.columns), blocks(self.alive, BLOCK)
+        share(lambda k: kernel(self.y, *columns, self.push, *arguments, *parts[k]), len(parts))
+
+    def body(self, time: float) -> Body:
+        """The system as laws of limited reach see it."""
+        x, v = self.y[:3, : self.alive], self.y[3:, : self.alive]
+        return Body(self.stepper, self.rows, self.alive, x, v, time)
+
+    @property
+    def K(self) -> Any:
+        """What the system's kernels read."""
+        return self.stepper.system.K_staged
