@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +71,7 @@ def splash(left: Any, right: Any) -> None:
 
 
 def granular(left: Any, right: Any) -> None:
-    """Kinetic energy of the grains, which collisions use up; the heap's surface."""
+    """Kinetic energy of the grains, which collisions use up; heights of the layers at the end."""
     sim, names, rows = motes.Simulation(motes.load("granular")), ("first", "second", "third"), []
     for number, _ in enumerate(sim.frames()):
         if number % EVERY == 0:
@@ -80,17 +79,10 @@ def granular(left: Any, right: Any) -> None:
             rows.append((sim.time, (v**2).sum(axis=1).mean() / 2 if len(v) else np.nan))
     left.semilogy(*np.transpose(rows), label="kinetic energy per kilogram")
     left.set(xlabel="time [s]", ylabel="J/kg")
-    x = np.concatenate([sim[name].position for name in names])
-    away = np.hypot(x[:, 0] + 0.1, x[:, 1] - 0.1)
-    edges = np.linspace(0, 0.5, 9)
-    rings = [x[(away >= a) & (away < b), 2] for a, b in pairwise(edges)]
-    middle, top = (edges[1:] + edges[:-1]) / 2, np.array([np.percentile(z, 97) for z in rings])
-    slope, begin = np.polyfit(middle[2:], top[2:], 1)
-    angle = np.degrees(np.arctan(-slope))
-    print(f"granular: {len(x)} grains, slope {angle:.1f} degrees")
-    right.plot(middle, top, "o", label="surface")
-    right.plot(middle, begin + slope * middle, label=f"{angle:.0f} degrees")
-    right.set(xlabel="distance from the jet [m]", ylabel="height [m]")
+    for name in names:
+        count, edges = np.histogram(sim[name].position[:, 2], np.arange(0, 0.8, 0.03))
+        right.stairs(count, edges, label=f"{name} layer")
+    right.set(xlabel="height [m]", ylabel="grains")
 
 
 def particle_life(left: Any, right: Any) -> None:
