@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import types
 from collections.abc import Callable, Sequence
@@ -28,21 +29,6 @@ ROOM = 1 << 14
 compiling, come from the heap."""
 
 
-def constant(thing: Any) -> Value:
-    """The value of a Python object that a function finds in its module or closure."""
-    if isinstance(thing, bool | np.bool_):
-        return literal(bool(thing), BOOL)
-    if isinstance(thing, np.generic):
-        return literal(thing.item(), of_dtype(thing.dtype))
-    if isinstance(thing, int):
-        return literal(thing, INT, bare=True)
-    if isinstance(thing, float):
-        return literal(thing, DOUBLE, bare=True)
-    if isinstance(thing, tuple):
-        return Group(tuple(constant(t) for t in thing), tuple(getattr(thing, "_fields", ())))
-    return Known(thing)
-
-
 def plain_function(thing: Any) -> types.FunctionType | None:
     """The Python function behind a kernel, a compiled function or a function; else None."""
     function = getattr(thing, "py_func", thing)
@@ -51,6 +37,42 @@ def plain_function(thing: Any) -> types.FunctionType | None:
 
 class Calls(Memory):
     """Calls by what is called."""
+
+    def constant(self, thing: Any) -> Value:
+        """The value of a Python object that a function finds in its module or closure."""
+        if isinstance(thing, bool | np.bool_):
+            return literal(bool(thing), BOOL)
+        if isinstance(thing, np.generic):
+            return literal(thing.item(), of_dtype(thing.dtype))
+        if isinstance(thing, int):
+            return literal(thing, INT, bare=True)
+        if isinstance(thing, float):
+            return literal(thing, DOUBLE, bare=True)
+        if isinstance(thing, tuple):
+            items = tuple(self.constant(t) for t in thing)
+            return Group(items, tuple(getattr(thing, "_fields", ())))
+        if isinstance(thing, np.ndarray):
+            return self._table(thing)
+        return Known(thing)
+
+    def _table(self, array: np.ndarray[Any, Any]) -> Value:
+        """An array as it is while compiling, part of the machine code; it is only read."""
+        item = of_dtype(array.dtype)
+        if array.size > ROOM:
+            raise Unsupported(f"an array of more than {ROOM} numbers; pass it as an argument")
+        whole = item.kind == "b"
+        numbers = [str(int(x)) if whole else literal(x, item).text for x in array.ravel().tolist()]
+        content = ", ".join(f"{item.stored} {number}" for number in numbers)
+        kind = f"[{array.size} x {item.stored}]"
+        name = f"@table_{hashlib.sha256(f'{kind}{content}'.encode()).hexdigest()[:24]}"
+        filled = f"[{content}]" if array.size else "zeroinitializer"
+        self.declare(f"{name} = internal global {kind} {filled}, align 64")
+        extents = tuple(map(str, array.shape))
+        return View(Array(item, array.ndim, True), name, extents)
+
+    def declare(self, text: str) -> None:
+        """Declare something outside of the function."""
+        raise NotImplementedError
 
     def call(self, thing: Any, arguments: Sequence[Value]) -> Value:
         """The value of a call of something known."""
@@ -66,7 +88,7 @@ class Calls(Memory):
             if len(arguments) != len(thing._fields):
                 raise Unsupported(f"{thing.__name__} takes {len(thing._fields)} values")
             return Group(tuple(arguments), thing._fields)
-        if isinstance(thing, np.ufunc) and thing in FORMULAS:
+        if isinstance(thing, np.ufunc | types.BuiltinFunctionType) and thing in FORMULAS:
             return self._formula(FORMULAS[thing], arguments)
         function = plain_function(thing)
         if function is None:
@@ -255,5 +277,7 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
 FORMULAS = {
     np.exp: "exp", np.log: "log", np.sin: "sin", np.cos: "cos", np.tanh: "tanh",
     np.arctan2: "atan2", np.power: "pow",
+    math.exp: "exp", math.log: "log", math.sin: "sin", math.cos: "cos", math.tanh: "tanh",
+    math.atan2: "atan2", math.pow: "pow",
 }  # fmt: skip
-"""NumPy's functions that the project has formulas for."""
+"""NumPy's and Python's functions that the project has formulas for."""

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from motes.generated import executed
 from motes.jit import jit
 
 Array = NDArray[np.float64]
@@ -69,8 +70,7 @@ def _sum(line: Sum) -> str:
 
 def _kernel(name: str, text: list[str], *, inline: bool) -> Kernel:
     names: dict[str, Any] = {"__name__": __name__, "math": math}
-    exec("\n".join(text), names)
-    return jit(names[name], inline=inline)
+    return jit(executed("\n".join(text), names)[name], inline=inline)
 
 
 @jit

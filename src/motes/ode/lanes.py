@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from motes.generated import executed
 from motes.jit import EXACT, jit
 from motes.ode.arithmetic import Array, Kernel
 from motes.tableau import Explicit
@@ -224,6 +225,5 @@ def _combination(rows: Sequence[Sequence[float]]) -> Kernel:
 def _made(lines: list[str], name: str, names: dict[str, Any]) -> Kernel:
     """A kernel from generated source: numbers of a table and of lanes stand in the machine code."""
     names = {"__name__": __name__, **names}
-    exec("\n".join(lines), names)
-    function: Callable[..., Any] = names[name]
+    function: Callable[..., Any] = executed("\n".join(lines), names)[name]
     return jit(function)
