@@ -70,10 +70,6 @@ class Calls(Memory):
         extents = tuple(map(str, array.shape))
         return View(Array(item, array.ndim, True), name, extents)
 
-    def declare(self, text: str) -> None:
-        """Declare something outside of the function."""
-        raise NotImplementedError
-
     def call(self, thing: Any, arguments: Sequence[Value]) -> Value:
         """The value of a call of something known."""
         try:
@@ -89,7 +85,7 @@ class Calls(Memory):
                 raise Unsupported(f"{thing.__name__} takes {len(thing._fields)} values")
             return Group(tuple(arguments), thing._fields)
         if isinstance(thing, np.ufunc | types.BuiltinFunctionType) and thing in FORMULAS:
-            return self._formula(FORMULAS[thing], arguments)
+            return self.formula(FORMULAS[thing], arguments)
         function = plain_function(thing)
         if function is None:
             raise Unsupported(f"{getattr(thing, '__name__', thing)!r} cannot be called in a kernel")
@@ -101,7 +97,7 @@ class Calls(Memory):
         """The value of a call of another kernel."""
         raise NotImplementedError
 
-    def _formula(self, name: str, arguments: Sequence[Value]) -> Value:
+    def formula(self, name: str, arguments: Sequence[Value]) -> Value:
         """An elementary function, by the project's own formula for the arguments' precision."""
         from motes.kernel import ELEMENTARY
 
@@ -220,6 +216,27 @@ class Calls(Memory):
         for text in texts:
             bytes = self.do(f"mul nsw i64 {bytes}, {text}")
         return View(packed, self.heap(bytes), texts)
+
+    def reshaped(self, array: View, extents: Sequence[Value]) -> View:
+        """`array.reshape`, `array.ravel()` of a packed array: the same numbers in another shape."""
+        if not array.type.packed:
+            raise Unsupported("only an array whose numbers follow each other can be reshaped")
+        if len(extents) == 1 and isinstance(extents[0], Group):
+            extents = extents[0].items
+        sizes = [self.cast(self._number(e), INT) for e in extents]
+        texts = [size.text for size in sizes]
+        for place, size in enumerate(sizes):
+            if size.literal == -1:
+                others = self.product([*texts[:place], *texts[place + 1 :]])
+                texts[place] = self.do(f"sdiv i64 {self.product(array.shape)}, {others}")
+        return View(Array(array.type.item, len(texts), True), array.address, tuple(texts))
+
+    def product(self, extents: Sequence[str]) -> str:
+        """Of integers in registers."""
+        result = "1"
+        for place, extent in enumerate(extents):
+            result = self.do(f"mul nsw i64 {result}, {extent}") if place else extent
+        return result
 
     def zeros(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
         """numpy.zeros."""

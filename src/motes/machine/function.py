@@ -146,8 +146,8 @@ class Function(Loops):
             arguments = [*arguments, *(self.constant(d) for d in defaults[-missing:])]
         kinds = tuple(type_of(a) for a in arguments)
         name, result, lent = self.module.function(thing, function, kinds, self.flags)
-        if _has_array(result) and self._loops:
-            raise Unsupported("a function that returns an array, called inside a loop")
+        if lent and self._loops:
+            raise Unsupported("a function that returns an array of its own, called inside a loop")
         passed = [
             f"{t} {r}"
             for a, kind in zip(arguments, kinds, strict=True)

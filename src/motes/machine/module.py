@@ -48,7 +48,7 @@ class Module:
 
         `thing` is what is called: a kernel has flags of its own, a plain function those given.
         """
-        flags = getattr(thing, "flags", flags if isinstance(flags, frozenset) else None)
+        flags = getattr(thing, "flags", flags)
         flags = frozenset(flags.split()) if isinstance(flags, str) else flags
         key = (function, flags, tuple(kinds))
         if key in self._functions:

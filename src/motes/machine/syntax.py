@@ -76,10 +76,7 @@ class Expressions(Calls):
             return literal(array.type.axes, INT, bare=True)
         if name == "dtype":
             return Known(np.dtype(array.type.item.name))
-        size = array.shape[0]
-        for extent in array.shape[1:]:
-            size = self.do(f"mul nsw i64 {size}, {extent}")
-        return Scalar(INT, size)
+        return Scalar(INT, self.product(array.shape))
 
     def _of_Subscript(self, node: ast.Subscript) -> Value:
         base, places = self.value(node.value), self._places(node.slice)
@@ -225,11 +222,14 @@ class Expressions(Calls):
     def _of_Call(self, node: ast.Call) -> Value:
         if node.keywords:
             raise Unsupported("arguments without keywords")
-        if isinstance(node.func, ast.Attribute) and node.func.attr == "view":
-            base = self.value(node.func.value)
-            if isinstance(base, Scalar):
+        if isinstance(node.func, ast.Attribute):
+            base, name = self.value(node.func.value), node.func.attr
+            if isinstance(base, Scalar) and name == "view":
                 kind = self._thing(node.args[0])
                 return self.bits_as(base, of_dtype(np.dtype(kind)))
+            if isinstance(base, View) and name in ("reshape", "ravel"):
+                extents = [self.value(a) for a in node.args] or [literal(-1, INT)]
+                return self.reshaped(base, extents)
         thing = self.value(node.func)
         if not isinstance(thing, Known):
             raise Unsupported("only functions are called")
