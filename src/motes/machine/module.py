@@ -57,8 +57,8 @@ class Module:
                 raise Unsupported(f"{function.__name__} calls itself")
             return known
         self._functions[key] = None
-        writer = Function(self, function, kinds, flags)
         name = f"{function.__name__}.{len(self._functions)}"
+        writer = Function(self, function, kinds, flags)
         inline = "alwaysinline" if getattr(thing, "inline", True) else "noinline"
         self._texts.append(writer.text(name, f"{inline} {PLAIN}"))
         self._functions[key] = made = Made(name, writer.result, writer.lent)

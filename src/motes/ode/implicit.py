@@ -61,7 +61,8 @@ def _estimate(table: Implicit, frame: Frame, slope: Kernel, wrap: Wrap) -> Kerne
         estimate = w[(spare + ERROR) * n : (spare + ERROR + 1) * n]
         result = w[(spare + RESIDUAL) * n : (spare + RESIDUAL + 1) * n]
         evaluations = 0
-        for i in extra:
+        for place in range(extra.size):
+            i = extra[place]
             weigh(w, n, spare + STATE, 0, a[i, :i], h)
             slope(t + c[i] * h, state, w, FIRST_SLOPE + 1 + i, args)
             evaluations += 1
@@ -121,7 +122,8 @@ def _diagonal(
     @wrap.loop
     def take(t, y, end, w, h, args):  # type: ignore[no-untyped-def]
         evaluations = linearise(t, y, w, args)
-        for i in needed:
+        for place in range(needed.size):
+            i = needed[place]
             own = FIRST_SLOPE + 1 + i
             if i == 0 and a[i, i] == 0.0:
                 copy(w[FIRST_SLOPE * n : (FIRST_SLOPE + 1) * n], w[own * n : (own + 1) * n])
