@@ -16,6 +16,7 @@ import numpy as np
 from motes.generated import executed
 from motes.jit import EXACT, jit
 from motes.ode.arithmetic import Array, Kernel
+from motes.ode.march import LAST, NOW, SAFETY
 from motes.tableau import Explicit
 
 LANES = 16
@@ -71,21 +72,23 @@ def march(f: Any, size: int, arguments: int, table: Explicit) -> Kernel:
         zero = np.zeros((size, LANES))
         k = np.zeros((last + 1, size, LANES))
         a = np.zeros((arguments, LANES))
-        t = np.full(LANES, t1)
+        t = np.zeros(LANES)
         h = np.zeros(LANES)
         now = np.zeros(LANES)
         want = np.zeros(LANES)
         norm = np.zeros(LANES)
-        before = np.ones(LANES)
+        before = np.zeros(LANES)
         taken = np.zeros(LANES)
         refused = np.zeros(LANES)
-        system = np.full(LANES, -1)
+        system = np.zeros(LANES, np.int64)
         new = np.zeros(LANES, np.bool_)
         done = np.zeros(LANES, np.bool_)
         sign = 1.0 if t1 >= t0 else -1.0
         following = lower
         open_ones = upper - lower
         idle = True
+        for lane in range(LANES):
+            t[lane], before[lane], system[lane] = t1, 1.0, -1
         while open_ones > 0:
             if idle and following < upper:
                 for lane in range(LANES):
@@ -139,8 +142,8 @@ def march(f: Any, size: int, arguments: int, table: Explicit) -> Kernel:
                     good = e <= 1.0
                     e = e if e < 1e10 else 1e10
                     e = e if e > 1e-10 else 1e-10
-                    kept = rough_power(before[lane], 0.2 * power)
-                    grow = 0.9 * rough_power(e, -0.85 * power) * kept
+                    kept = rough_power(before[lane], LAST * power)
+                    grow = SAFETY * rough_power(e, -NOW * power) * kept
                     shrink = 0.9 * rough_power(e, -power)
                     grow = min(10.0, max(0.2, grow))
                     shrink = min(0.9, max(0.1, shrink))

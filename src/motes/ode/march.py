@@ -21,6 +21,10 @@ RUNNING, DONE, STOPPED, TOO_SMALL, INFINITE, TOO_MANY = range(6)
 TIME, STEP, ERROR = range(3)
 """Places in `clock`: time, next step, logarithm of the last accepted step's error."""
 
+SAFETY, LAST, NOW = 0.87, 0.15, 0.9
+"""Step control: the next step is SAFETY x (last error)^(LAST / order) / (this one)^(NOW / order) as
+long. Chosen for the fewest evaluations at equal error, of eighth order, on six problems."""
+
 SMALL = math.log(1e-4)
 """The least that counts for the last step's error: one lucky step must not hold back the next."""
 
@@ -217,7 +221,7 @@ def steps(pieces: Pieces, room: Room, watch: Kernel, cross: Kernel, wrap: Wrap) 
                     continue
                 # Proportional and integral control: the last two errors choose the next step.
                 now = np.log(max(size, 1e-10))
-                grow = 0.9 * np.exp((0.2 * clock[ERROR] - 0.85 * now) / control.order)
+                grow = SAFETY * np.exp((LAST * clock[ERROR] - NOW * now) / control.order)
                 grow = min(control.most, max(0.2, grow))
                 clock[STEP] = h * (min(1.0, grow) if counts[RETRY] else grow)
                 clock[ERROR] = max(now, SMALL)
