@@ -242,17 +242,17 @@ def steps(pieces: Pieces, room: Room, watch: Kernel, cross: Kernel, wrap: Wrap) 
                 answer, time = record.answers[counts[ASKED]], asked[counts[ASKED]]
                 counts[ASKED] += 1
                 if time == after:
-                    copy(end, answer)
+                    answer[:] = end
                 else:
                     counts[EVALUATIONS] += inside((time - t) / h, t, y, w, h, answer, args)
             if counts[STATUS] == STOPPED:
                 counts[EVALUATIONS] += inside((reach - t) / h, t, y, w, h, state, args)
                 copy(state, end)
             clock[TIME] = reach
-            copy(end, y)
-            copy(following, slope)
+            y[:] = end
+            slope[:] = following
             if mesh_y.shape[0]:
-                copy(y, mesh_y[counts[MESH]])
+                mesh_y[counts[MESH]] = y
             mesh_t[counts[MESH]] = reach
             counts[MESH] += 1
             if counts[STATUS] == RUNNING and reach == control.stop:

@@ -78,11 +78,14 @@ def slope(f: Function, shape: tuple[int, ...]) -> Kernel:
     size = math.prod(shape)
     if not compiled(f):
 
+        def line(t, y, w, row, args):  # type: ignore[no-untyped-def]
+            w[row * size : (row + 1) * size] = f(t, y, *args)
+
         def call(t, y, w, row, args):  # type: ignore[no-untyped-def]
             value = np.asarray(f(t, y.reshape(shape), *args))
             w[row * size : (row + 1) * size] = value.reshape(-1)
 
-        return call
+        return line if len(shape) == 1 else call
     if isinstance(f, FirstOrder):
         return _slope_of_both(f, size)
     f = _fused(f)
