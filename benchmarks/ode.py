@@ -13,7 +13,7 @@ import importlib.util
 
 import numpy as np
 from _report import Report, arguments, best, best_in_turn, machine
-from numba import carray, cfunc, njit
+from numba import carray, cfunc, njit, prange
 
 from motes import ode
 
@@ -241,7 +241,7 @@ def many_systems(report: Report, quick: bool) -> None:
 
 
 def _numbalsoda(starts: np.ndarray) -> float:
-    """Seconds for its DOP853 on these systems, on one thread."""
+    """Seconds for its DOP853 on these systems, on all processors."""
     from numbalsoda import dop853, lsoda_sig
 
     @cfunc(lsoda_sig)
@@ -253,9 +253,9 @@ def _numbalsoda(starts: np.ndarray) -> float:
 
     pointer, times = rhs.address, np.array([0.0, 20.0])
 
-    @njit
+    @njit(parallel=True)
     def run(starts):
-        for i in range(len(starts)):
+        for i in prange(len(starts)):
             dop853(pointer, starts[i], times, rtol=1e-6, atol=1e-6)
 
     return best(lambda: run(starts), 1)
