@@ -53,7 +53,7 @@ def rough_power(x: float, p: float) -> float:
     k = np.floor(y)
     f = y - k
     scale = np.int64(np.float64(k + WHOLE + 1023.0).view(np.int64) << 52).view(np.float64)
-    return scale * (1.0 + f * (0.6565 + 0.3435 * f))
+    return float(scale * (1.0 + f * (0.6565 + 0.3435 * f)))
 
 
 def march(f: Any, size: int, arguments: int, table: Explicit) -> Kernel:
@@ -213,7 +213,7 @@ def _slope(f: Any, size: int, arguments: int) -> Kernel:
     further = "".join(f", a[{c}, lane]" for c in range(arguments))
     lines = [
         "def slope(t, y, a, out, width):",
-        f"    for lane in range(width):",
+        "    for lane in range(width):",
         f"        value = f(t[lane], ({state}){further})",
         *(f"        out[{c}, lane] = value[{c}]" for c in range(size)),
     ]
@@ -229,7 +229,7 @@ def _combination(rows: Sequence[Sequence[float]]) -> Kernel:
             lines += [
                 f"    if row == {number}:",
                 "        for c in range(y.shape[0]):",
-                f"            for lane in range(width):",
+                "            for lane in range(width):",
                 f"                out[c, lane] = y[c, lane] + h[lane] * ({' + '.join(terms)})",
             ]
     return _made(lines, "combine", {})
