@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 from motes import ode
-from motes.integrate import table
+from motes.integrate import scene_methods, table
 from motes.ode.stability import error_constant
 
 PAGE = Path(__file__).with_suffix(".md")
@@ -25,6 +25,29 @@ def number(value: float) -> str:
     if math.isnan(value):
         return "–"
     return "∞" if math.isinf(value) else f"{value:.3g}"
+
+
+def facts_of(m: ode.MethodFacts) -> str:
+    """What a method's table says about it, in sentences."""
+    found = table(m.name)
+    stages = f"{m.stages} stage{'s' if m.stages > 1 else ''}"
+    parts = [f"Order {m.order}, {stages}"]
+    if not math.isnan(constant := error_constant(found)):
+        parts.append(f"error constant {constant:.3g}")
+    if m.embedded is not None:
+        parts.append(f"error estimate of order {m.embedded}")
+    parts += ["symplectic"] * m.symplectic
+    if getattr(found, "a_explicit", ()):
+        parts.append("takes a `stiff` part alone")
+    limits = []
+    if not math.isnan(m.real):
+        limits.append("any decay" if math.isinf(m.real) else f"decays to h k = {m.real:.3g}")
+    limits.append(
+        "any oscillation" if math.isinf(m.imaginary)
+        else f"oscillations to h w = {m.imaginary:.3g}" if m.imaginary else "no oscillation"
+    )  # fmt: skip
+    where = "In scenes and `motes.ode`." if m.name in scene_methods() else "In `motes.ode`."
+    return f"{', '.join(parts)}. Stable for {' and '.join(limits)}. {where}"
 
 
 def page() -> str:
@@ -50,7 +73,7 @@ def page() -> str:
         )
     for m in facts:
         text = inspect.cleandoc(import_module(f"motes.integrate.{m.name}").__doc__ or "")
-        lines.append(f"\n## {m.name}\n\n{text}")
+        lines.append(f"\n## {m.name}\n\n{text}\n\n{facts_of(m)}")
     return "\n".join(lines) + "\n"
 
 

@@ -54,6 +54,7 @@ def test_the_command_writes_one_picture(tmp_path: Path, capsys: pytest.CaptureFi
         (("circle", "--method", "rk5"), 'Did you mean "rk4"'),
         (("circle", "--step", "0"), "above 0"),
         (("circle", "--method", "leapfrog"), "for x'' = a"),
+        (("circle", "--step", "1e-9"), "too short for a picture"),
         (("circle", "--save", "circle.jpg"), ".png"),
     ],
 )
@@ -62,6 +63,16 @@ def test_mistakes_get_one_line(arguments, message, capsys: pytest.CaptureFixture
     said = capsys.readouterr().err
     assert message in said
     assert "Traceback" not in said
+
+
+def test_steps_and_methods_that_come_twice_count_once(tmp_path: Path):
+    pytest.importorskip("matplotlib")
+    from motes.ode.picture import draw
+
+    figure = draw("kepler", methods=["rk4", "rk4", "euler"], steps=[0.05, 0.05, 0.025])
+    errors = figure.axes[1]
+    assert [line.get_label() for line in errors.lines] == ["rk4: 4.8", "euler: far off"]
+    assert [len(line.get_xdata()) for line in errors.lines] == [2, 2]
 
 
 def test_the_list_names_problems_and_methods(capsys: pytest.CaptureFixture[str]):

@@ -8,7 +8,7 @@ from functools import cache
 from typing import TypeGuard
 
 from motes.errors import SceneError, likely
-from motes.tableau import Implicit, Method, Table
+from motes.tableau import BackwardDifference, Implicit, Method, Nystrom, Rosenbrock, Table
 
 
 @cache
@@ -27,9 +27,22 @@ def scene_methods() -> dict[str, Method]:
     return {name: found for name, found in methods().items() if _scenic(found)}
 
 
+def _unscenic(found: Table) -> str:
+    """Why a scene cannot use a method; empty if it can."""
+    if isinstance(found, BackwardDifference):
+        return "it remembers the step before, and particles are born and bounce within steps"
+    if isinstance(found, Nystrom):
+        return "it is for forces without drag or wind, which scenes cannot promise"
+    if isinstance(found, Rosenbrock):
+        return "its matrix would need every force's derivatives to the last digit"
+    if isinstance(found, Implicit) and not found.diagonal:
+        return "its stages are solved together, those of scenes one by one"
+    return ""
+
+
 def _scenic(found: Table) -> TypeGuard[Method]:
     """Whether a scene can use it: a step without a past, its stages solved one by one."""
-    return isinstance(found, Method) and (not isinstance(found, Implicit) or found.diagonal)
+    return isinstance(found, Method) and not _unscenic(found)
 
 
 @cache
@@ -51,6 +64,7 @@ def method(name: str) -> Method:
     if not _scenic(found):
         menu = ", ".join(scene_methods())
         raise SceneError(
-            f'integrator "{name}" works in motes.ode, but not in a scene. Scenes take {menu}.'
+            f'integrator "{name}" works in motes.ode, but not in a scene: {_unscenic(found)}. '
+            f"Scenes take {menu}; of these, sdirk2, kencarp3 and kencarp4 are for stiff forces."
         )
     return found

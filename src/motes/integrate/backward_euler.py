@@ -1,6 +1,8 @@
 """Backward Euler: first order, damps every decay at any step. The sturdiest implicit method.
 
 The error estimate compares it with the trapezoid, whose first stage is the slope at the start.
+
+Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.3.
 """
 
 from motes.tableau import Implicit

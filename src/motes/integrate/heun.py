@@ -1,4 +1,8 @@
-"""Heun's method, the explicit trapezoid: second order with two evaluations."""
+"""Heun's method, the explicit trapezoid: second order with two evaluations.
+
+For loose tolerances and a first look. K. Heun, 1900; Hairer, Norsett and Wanner, Solving Ordinary
+Differential Equations I, section II.1.
+"""
 
 from motes.tableau import Explicit
 

@@ -2,6 +2,8 @@
 
 The error estimate is Simpson's rule, third order, on the cubic through both ends of the step; its
 stages cost nothing where steps are fixed.
+
+Hairer, Lubich and Wanner, Geometric Numerical Integration, section II.1.
 """
 
 from motes.tableau import Implicit

@@ -1,4 +1,7 @@
-"""The explicit midpoint rule: second order with two evaluations."""
+"""The explicit midpoint rule: second order with two evaluations.
+
+C. Runge, 1895; Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, section II.1.
+"""
 
 from motes.tableau import Explicit
 

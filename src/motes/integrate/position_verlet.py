@@ -1,4 +1,8 @@
-"""Leapfrog as drift, kick, drift (position Verlet): second order with one evaluation a step."""
+"""Leapfrog as drift, kick, drift (position Verlet): second order with one evaluation a step.
+
+For forces that are known at the middle of a step. Hairer, Lubich and Wanner, Geometric Numerical
+Integration, section I.1.
+"""
 
 from motes.tableau import Splitting
 

@@ -1,4 +1,8 @@
-"""The classical Runge-Kutta method: fourth order with four evaluations. The default."""
+"""The classical Runge-Kutta method: fourth order with four evaluations. The default.
+
+W. Kutta, 1901; Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, table
+II.1.2.
+"""
 
 from motes.tableau import Explicit
 

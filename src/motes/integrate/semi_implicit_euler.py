@@ -1,4 +1,7 @@
-"""Semi-implicit (symplectic) Euler: kick, then drift. Cheap, and stable for drag and springs."""
+"""Semi-implicit (symplectic) Euler: kick, then drift. Cheap, and stable for drag and springs.
+
+Hairer, Lubich and Wanner, Geometric Numerical Integration, section I.1.
+"""
 
 from motes.tableau import Splitting
 

@@ -2,6 +2,8 @@
 
 The error estimate is Simpson's rule, third order, on the cubic through both ends of the step; its
 stage costs nothing where steps are fixed.
+
+J. Crank and P. Nicolson, Proceedings of the Cambridge Philosophical Society 43 (1947) 50-67.
 """
 
 from motes.tableau import Implicit
