@@ -1,7 +1,7 @@
 """Where the points near a box are: runs of consecutive points, in the order of cells.
 
-Cells are narrow along x, so that a run of points in a row of cells begins and ends where the reach
-does. How wide rows of cells are is free, since a search looks into as many as it has to.
+Cells are narrow along x, so that a run of points in a row of cells begins and ends about where the
+reach does. How wide rows of cells are is free, since a search looks into as many as it has to.
 """
 
 # mypy: disallow-untyped-decorators=False
@@ -96,7 +96,7 @@ def _gap(low: Any, high: Any, left: Any, wide: Any, slack: Any) -> Any:
 
 @jit(flags=STRICT)
 def runs_near(low: Any, high: Any, reach: Any, grid: Any, cells: Any, run: Any, shift: Any) -> Any:
-    """Write first and last of the runs that hold all points within reach of a box.
+    """Write first and last of runs that hold all points within reach of a box, and some more.
 
     Returns how many runs there are, and how many points they hold.    `run` (k, 2); `shift` (k, 3) is from a run's points to their images near the box. Runs for
     which there is no room are only counted.
@@ -113,6 +113,7 @@ def runs_near(low: Any, high: Any, reach: Any, grid: Any, cells: Any, run: Any, 
     slack, cy, cz = 1e-6 * wide, 1 / sy, 1 / sz
     size, number, points = run.shape[0], np.int64(0), np.int64(0)
     y, last_y = _span(low[1] - wide, high[1] + wide, y0, sy, ny, grid.wraps[1])
+    x, last_x = _span(low[0] - wide, high[0] + wide, x0, sx, nx, grid.wraps[0])
     z, last_z = _span(low[2] - wide, high[2] + wide, z0, sz, nz, grid.wraps[2])
     for k in range(z, last_z + 1):
         gap_z = _gap(low[2], high[2], z0 + np.float64(k) * cz, cz, slack)
@@ -120,13 +121,11 @@ def runs_near(low: Any, high: Any, reach: Any, grid: Any, cells: Any, run: Any, 
         layer = (k - around_z * nz) * ny
         for j in range(y, last_y + 1):
             left = y0 + np.float64(j) * cy
-            rest = wide * wide - gap_z - _gap(low[1], high[1], left, cy, slack)
-            if rest < 0:
+            if gap_z + _gap(low[1], high[1], left, cy, slack) > wide * wide:
                 continue
             around_y = np.int64(0) if 0 <= j < ny else j // ny
             row = (layer + j - around_y * ny) * nx
-            half = np.sqrt(rest) + slack
-            i, last_x = _span(low[0] - half, high[0] + half, x0, sx, nx, grid.wraps[0])
+            i = x
             while i <= last_x:
                 around_x = np.int64(0) if 0 <= i < nx else i // nx
                 end = min(last_x, (around_x + 1) * nx - 1)
