@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import re
+import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -44,6 +45,7 @@ class Gathering:
         what follows from it is computed once."""
         self._of_laws = [self._places_of(law) for law in laws]
         self._kernel: Callable[..., Any] | None = None
+        self._first = threading.Lock()
 
     def _places_of(self, law: Law) -> list[int]:
         """Places of a law's reach and of its numbers."""
@@ -61,19 +63,28 @@ class Gathering:
             found[places] = _values(law, time)
         return found
 
-    def __call__(self, *arguments: Any) -> None:
+    def __call__(self, *arguments: Any) -> Any:
         """Add accelerations to pushes; see `_text`.
 
         Where a law's kernel is beyond what works on lanes, targets come one after another.
         """
         if self._kernel is None:
-            plain = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-            self._kernel = self._text(1 if plain else LANES)
-            try:
-                return self._kernel(*arguments)
-            except SceneError:
-                self._kernel = self._text(1)
+            with self._first:
+                if self._kernel is None:
+                    return self._tried(*arguments)
+        assert self._kernel is not None
         return self._kernel(*arguments)
+
+    def _tried(self, *arguments: Any) -> Any:
+        plain = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+        kernel = self._text(1 if plain else LANES)
+        try:
+            found = kernel(*arguments)
+        except SceneError:
+            kernel = self._text(1)
+            found = kernel(*arguments)
+        self._kernel = kernel
+        return found
 
     def _text(self, lanes: int) -> Callable[..., Any]:
         """The kernel that adds what follows from the sums of all laws to the targets' pushes.

@@ -23,7 +23,7 @@ MOST, LEAST = 1 << 13, 1 << 8
 """Targets of one task of sums."""
 
 ROOM = 512
-"""Points near a few targets that there is room for at first."""
+"""Points near a few targets that there is room for at first; it grows when there are more."""
 
 FEWEST = 5
 """Longest reaches along a period below which images would be met twice."""
@@ -79,6 +79,7 @@ class Swarm:
         self.laws, self.real, self.periodic = list(laws), real, periodic
         self.systems = sorted({n for _, targets, sources in laws for n in (*targets, *sources)})
         self._slots: Array = np.empty(0, np.int32)
+        self._room = ROOM
         self._alike: list[tuple[Gathering, str, tuple[str, ...]]] = []
         for target in self.systems:
             felt: dict[tuple[str, ...], list[Law]] = {}
@@ -149,7 +150,7 @@ class Swarm:
 
         def sweep(k: int) -> None:
             hold: Array = np.empty((max(kernel.sums, 3), LANES), real)
-            room = ROOM
+            room = self._room
             for source in sources:
                 slot = self._slots if source is target else nobody
                 theirs = tuple(source.column(key) for key in kernel.other)
@@ -163,7 +164,7 @@ class Swarm:
                         source is not sources[0], source is sources[-1], kept,
                         target.cells.row, push,
                     )  # fmt: skip
-                    room = max(room, 2 * needed)
+                    room = self._room = max(room, 2 * needed)
 
         for source in sources:
             for key in kernel.other:
