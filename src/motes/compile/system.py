@@ -187,7 +187,10 @@ class CompiledSystem:
             text, channels = Text("double", self._strict), Channels()
             write_emitter(text, emitter, address, channels)
             text.add(text.values.scene_text())
-            kernel = births_kernel(text.module(extra), trait_module, width, self.motion.inertial)
+            steady = not (text.values.varies_in_time or traits.values.varies_in_time)
+            kernel = births_kernel(
+                text.module(extra), trait_module, width, self.motion.inertial, steady
+            )
             result[address] = CompiledEmitter(
                 kernel, text.values.arrays(np.float64), channels.array()
             )

@@ -18,7 +18,7 @@ Pixels = NDArray[np.uint8]
 _CODECS: dict[str, tuple[str, str, str, dict[str, str]]] = {
     # suffix: container, codec, pixel format, settings. The settings, the number of threads
     # included, are fixed so that the same frames give the same file.
-    ".mp4": ("mp4", "libx264", "yuv420p", {"crf": "17", "preset": "veryfast"}),
+    ".mp4": ("mp4", "libx264", "yuv420p", {"crf": "17", "preset": "superfast"}),
     ".webp": ("webp", "libwebp_anim", "yuv420p", {"quality": "85", "compression_level": "2"}),
 }
 
