@@ -22,12 +22,15 @@ from motes.compile.pairs import Law, Writer
 from motes.compile.text import AXES, Text
 from motes.control.constant import Constant, Setting
 from motes.errors import SceneError
-from motes.interact.runs import runs_near
+from motes.interact.runs import chooser, runs_near
 from motes.jit import jit
-from motes.machine.lanes import bits, lowest, put, settled, take
+from motes.machine.lanes import put, settled, take
 
 LANES = 8
 """Targets that meet sources together; columns of targets go on for as many beyond the last."""
+
+CAUTION = 1e-6
+"""Share of the reach's square by which rounding may move a box: more than it does."""
 
 WIDE = 2.5
 """Reaches along x within which targets that meet sources together are."""
@@ -105,10 +108,10 @@ class Gathering:
                 prelude += f"    limit{reach} = n{reach} * n{reach}\n"
                 # Who does not count is taken at the reach, where laws are finite, and times 0.
                 body += (
-                f"                near = (square <= limit{reach}) & other\n"
-                f"                weight{reach} = F(1.0) if near else F(0.0)\n"
-                f"                square{reach} = min(square, limit{reach})\n"
-                f"                length{reach} = min(length, n{reach})\n"
+                    f"                near = (square <= limit{reach}) & other\n"
+                    f"                weight{reach} = F(1.0) if near else F(0.0)\n"
+                    f"                square{reach} = min(square, limit{reach})\n"
+                    f"                length{reach} = min(length, n{reach})\n"
                 )
             call = writer.call("near").replace("(p, ", f"(p{i}, ", 1)
             call = call.replace("square, sqrt(square)", f"square{reach}, length{reach}")
@@ -122,14 +125,16 @@ class Gathering:
             sums = "".join(f"sum{k}, " for k in width)
             a = writer.particle("A", law.fields[0], "a_")
             given = f"{writer.translated('acceleration')}(p{i}, {a}, ({sums}))"
-            end += f"            fx, fy, fz = {given}\n            px, py, pz = px + fx, py + fy, pz + fz\n"
+            end += f"            fx, fy, fz = {given}\n"
+            end += "            px, py, pz = px + fx, py + fy, pz + fz\n"
         numbers = "".join(f"    n{k} = numbers[{k}]\n" for k in range(len(self._places)))
         most = list(reaches.values())
         widest = f"max({', '.join(most)})" if len(most) > 1 else most[0]
         lines = (
             "@kernel\ndef gather(numbers, targets, slot, key, along, sources, grid, cells, "
             "begin, end, run, shift, pick, hold, goes_on, ends, kept, order, push):\n"
-            f"{numbers}{prelude}    reach = {widest}\n    most, wide = reach * reach * F(1.000001), reach * F({WIDE})\n"
+            f"{numbers}{prelude}    reach = {widest}\n"
+            f"    limit, wide = reach * reach * F({1 + CAUTION}), reach * F({WIDE})\n"
         )
         lines += "".join(f"    t_{n} = targets[{k}]\n" for k, n in enumerate(self.own))
         lines += "".join(f"    s_{n} = sources[{k}]\n" for k, n in enumerate(self.other))
@@ -144,35 +149,12 @@ class Gathering:
         )
         lines += "".join(f"        a_{n} = take(t_{n}, i, {lanes})\n" for n in self.own)
         lines += start + "        r = 0\n        while r < number:\n"
-        lines += "            held = uint64(0)\n"
-        for k, n in enumerate(AXES):
-            lines += f"            d_{n} = shift[r, {k}]\n"
-            lines += f"            low_{n}, high_{n} = low[{k}] - d_{n}, high[{k}] - d_{n}\n"
-        same = " and ".join(f"shift[r, {k}] == d_{n}" for k, n in enumerate(AXES))
         lines += (
-            f"            while r < number and {same}:\n"
-            "                at, last = run[r, 0], run[r, 1]\n"
-            "                while at < last:\n"
-            "                    some, near_box = min(last - at, 64), uint64(0)\n"
-            f"                    for c in range(0, some, {lanes}):\n"
+            "            dx, dy, dz = shift[r, 0], shift[r, 1], shift[r, 2]\n"
+            "            places = (s_x, s_y, s_z)\n"
+            "            r, held = choose(places, low, high, limit, r, number, run, shift, pick)\n"
         )
-        for n in AXES:
-            lines += f"                        c_{n} = take(s_{n}, at + c, {lanes})\n"
-            lines += (
-                f"                        g_{n} = max(max(c_{n} - high_{n}, low_{n} - c_{n}), F(0.0))\n"
-            )
-        lines += (
-            "                        hit = g_x * g_x + g_y * g_y + g_z * g_z <= most\n"
-            "                        near_box |= bits(hit) << uint64(c)\n"
-            "                    near_box &= uint64(0xFFFFFFFFFFFFFFFF) >> uint64(64 - some)\n"
-            "                    while near_box != uint64(0):\n"
-            "                        pick[held] = uint32(uint64(at) + lowest(near_box))\n"
-            "                        near_box &= near_box - uint64(1)\n"
-            "                        held += uint64(1)\n"
-            "                    at += 64\n"
-            "                r += 1\n"
-        )
-        lines += "".join(f"            o_{n} = settled(a_{n} - d_{n})\n" for n in AXES)
+        lines += "".join(f"            o_{n} = settled(a_{n} - d{n})\n" for n in AXES)
         lines += "            for e in range(held):\n                k = pick[e]\n"
         lines += "".join(f"                b_{n} = s_{n}[k]\n" for n in self.other)
         lines += (
@@ -187,8 +169,8 @@ class Gathering:
             f"{end}            put(hold[0], 0, px)\n            put(hold[1], 0, py)\n"
             "            put(hold[2], 0, pz)\n"
             "            for e in range(stop - i):\n                row = order[i + e]\n"
-            "                push[0, row] += hold[0, e]\n                push[1, row] += hold[1, e]\n"
-            "                push[2, row] += hold[2, e]\n"
+            "                for n in range(3):\n"
+            "                    push[n, row] += hold[n, e]\n"
             f"        else:\n{keep}"
             "            for e in range(stop - i):\n"
             "                for n in range(kept.shape[0]):\n"
@@ -196,9 +178,15 @@ class Gathering:
             "        i = stop\n    return end, 0\n"
         )
         text.add(lines)
-        extra = {"int32": np.int32, "uint32": np.uint32, "uint64": np.uint64, "take": take, "put": put}
+        extra = {
+            "int32": np.int32,
+            "uint32": np.uint32,
+            "uint64": np.uint64,
+            "take": take,
+            "put": put,
+        }
         extra |= {"runs_near": runs_near, "same_row": _same_row, "bounds": _bounds}
-        extra |= {"bits": bits, "lowest": lowest, "settled": settled}
+        extra |= {"choose": chooser(lanes), "settled": settled}
         found: Callable[..., Any] = text.module(extra)["gather"]
         return found
 

@@ -114,7 +114,8 @@ class Swarm:
         name, time, n, real = body.name, body.time, body.alive, self.real
         own = [law for law, targets, sources in self.laws if name in targets and name in sources]
         reach = max(law.reach(time) for law in own or [law for law, _, _ in self.laws])
-        low, size = self.periodic.low.astype(real), self.periodic.size.astype(real)
+        low: Array = self.periodic.low.astype(real)
+        size: Array = self.periodic.size.astype(real)
         position: Array = np.empty((3, n), real)
         parts = blocks(n, ROWS)
         found: Array = np.zeros((max(len(parts), 1), 2, 3), real)
@@ -156,8 +157,9 @@ class Swarm:
                 theirs = tuple(source.column(key) for key in kernel.other)
                 begin, end = parts[k]
                 while begin < end:
-                    run, shift = np.empty((room, 2), np.int64), np.empty((room, 3), real)
-                    chosen = np.empty(room, np.uint32)
+                    run: Array = np.empty((room, 2), np.int64)
+                    shift: Array = np.empty((room, 3), real)
+                    chosen: Array = np.empty(room, np.uint32)
                     begin, needed = kernel(
                         numbers, mine, slot, target.cells.key, int(target.grid.shape[0]), theirs,
                         source.grid, source.cells, begin, end, run, shift, chosen, hold,

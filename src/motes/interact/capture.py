@@ -49,14 +49,15 @@ def _nearest(hunters: Any, prey: Any, radius: float) -> tuple[Any, Any]:
     """Rows of hunters (3, m) with prey (3, n) within a radius [m], and of each one's nearest."""
     from motes.neighbours import within
 
+    nobody = np.zeros(0, np.int64)
     if not hunters.size:
-        return np.zeros((2, 0), np.int64)
+        return nobody, nobody
     low, high = hunters.min(axis=1) - radius, hunters.max(axis=1) + radius
-    around = np.flatnonzero(((prey.T >= low) & (prey.T <= high)).all(axis=1))
+    around = np.flatnonzero(((low <= prey.T) & (high >= prey.T)).all(axis=1))
     if not around.size:
-        return np.zeros((2, 0), np.int64)
-    i, j = within(prey[:, around].T, radius, targets=hunters.T)
-    j = around[j]
+        return nobody, nobody
+    i, found = within(prey[:, around].T, radius, targets=hunters.T)
+    j = around[found]
     order = np.lexsort((j, np.square(hunters[:, i] - prey[:, j]).sum(axis=0), i))
     first = order[np.unique(i[order], return_index=True)[1]]
     return i[first], j[first]
