@@ -16,11 +16,13 @@ from motes.machine.kinds import (
     DOUBLE,
     INT,
     NUMBERS,
+    UINT,
     Array,
     Number,
     Unsupported,
     of_dtype,
 )
+from motes.machine.lanes import bits, lowest, put, settled, take
 from motes.machine.memory import Memory
 from motes.machine.values import Group, Known, Scalar, Value, View, type_of
 
@@ -177,7 +179,7 @@ class Calls(Memory):
         """numpy.isnan."""
         number = self._real(value)
         test = f"fcmp uno {number.type.llvm} {number.text}, {number.text}"
-        return Scalar(BOOL, self.do(test))
+        return Scalar(BOOL.over(number.type.lanes), self.do(test))
 
     def length(self, value: Value) -> Value:
         """len."""
@@ -196,11 +198,27 @@ class Calls(Memory):
 
     def bits_as(self, value: Scalar, kind: Number) -> Scalar:
         """`value.view(type)`: the same bits as another type."""
+        kind = kind.over(value.type.lanes)
         if value.type.bits != kind.bits:
             raise Unsupported(f"{value.type} and {kind} differ in size")
         if value.type.llvm == kind.llvm:
             return Scalar(kind, value.text)
         return Scalar(kind, self.do(f"bitcast {value.type.llvm} {value.text} to {kind.llvm}"))
+
+    def bits(self, condition: Value) -> Value:
+        """`lanes.bits`."""
+        truth = self.truth(condition)
+        lanes = truth.type.lanes
+        whole = truth.text
+        if lanes > 1:
+            whole = self.do(f"bitcast {truth.type.llvm} {truth.text} to i{lanes}")
+        return Scalar(UINT, self.do(f"zext i{lanes} {whole} to i64"))
+
+    def lowest(self, number: Value) -> Value:
+        """`lanes.lowest`."""
+        self.declare("declare i64 @llvm.cttz.i64(i64, i1)")
+        whole = self.cast(self._number(number), UINT).text
+        return Scalar(UINT, self.do(f"call i64 @llvm.cttz.i64(i64 {whole}, i1 true)"))
 
     def empty(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
         """numpy.empty: room that the call has for itself; its numbers are not set."""
@@ -287,6 +305,11 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     np.round: _intrinsic("roundeven"),
     np.rint: _intrinsic("roundeven"),
     enumerate: Calls.numbered,
+    take: Calls.take,
+    put: Calls.put,
+    bits: Calls.bits,
+    lowest: Calls.lowest,
+    settled: _intrinsic("arithmetic.fence"),
     math.fabs: _intrinsic("fabs"),
 }
 """Handlers by the function itself."""
