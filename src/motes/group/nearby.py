@@ -14,16 +14,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.compile.pairs import FORCE, LISTED, POTENTIAL, VIRIAL, Law
+from motes.compile.pairs import FORCE, POTENTIAL, VIRIAL, Law
+from motes.compile.text import AXES
 from motes.errors import SceneError, SimulationError
 from motes.group.lasting import Body, Class, Lasting, Lists
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, Packing, arrange, common_grid, wrapped
 from motes.interact.clusters import lists
 from motes.jit import blocks, share
+from motes.memory import allocate
 
 ALIKE = 1.5
 """Ratio of reaches up to which laws share lists."""
+
+RECORDS = "records"
+"""Name of the places of all slots, x, y, z and a fourth number that nobody reads."""
 
 ROWS = 1 << 14
 """Rows of one task of a loop that is quick."""
@@ -178,7 +183,10 @@ class Nearby:
     def _packed(
         self, shared: Class, found: Lists, bodies: dict[str, Body]
     ) -> tuple[dict[str, dict[str, NDArray[Any]]], float]:
-        """What the laws read of every system in the order of slots; how far one has moved [m]."""
+        """What the laws read of every system in the order of slots; how far one has moved [m].
+
+        Places come as records (slots + 1, 4), and, as the columns of these, one by one.
+        """
         wanted: dict[str, set[str]] = {name: set() for name in shared.systems}
         for law, targets, sources in shared.laws:
             own, other = law.fields
@@ -192,13 +200,9 @@ class Nearby:
                 continue
             packing = Packing(found.arranged[name], self.periodic)
             size = found.arranged[name].slots + 1
-            position = self._space((name, "x"), (3, size))
-            moved = max(moved, packing.positions(body.position, position))
-            columns = dict(zip("xyz", position, strict=True))
-            for axis, then in enumerate(LISTED):
-                if then in wanted[name]:
-                    parts = found.arranged[name].real, found.arranged[name].ghosts
-                    columns[then] = np.concatenate([*(p.position[axis] for p in parts), [0]])
+            records = self._space((name, "x"), (size, 4))
+            moved = max(moved, packing.positions(body.position, records))
+            columns = {RECORDS: records, **dict(zip(AXES, records.T, strict=False))}
             for field_ in sorted(wanted[name] - set(columns)):
                 kept = found.columns.get((name, field_))
                 if kept is None:
@@ -219,7 +223,8 @@ class Nearby:
         size = int(np.prod(shape))
         room = self._room.get(key)
         if room is None or room.size < size:
-            room = self._room[key] = np.empty(size + size // 8, self.real)
+            room = allocate((size + size // 8,), self.real, "what neighbours are read from")
+            self._room[key] = room
         return room[:size].reshape(shape)
 
     def _summed(
@@ -230,30 +235,28 @@ class Nearby:
         n = found.arranged[target].order.size
         out = self._space(("sums",), (law.sums(what), n))
         out[:] = 0
-        own, other = law.fields
+        own, other = law.fields[0], [name for name in law.fields[1] if name not in AXES]
         mine = tuple(packed[target][name] for name in own)
-        limit, listed = self.real(law.reach(time)) ** 2, self.real(found.radius) ** 2
+        limit = self.real(law.reach(time)) ** 2
         kernel = law.sweep(what)
         for source in sources:
             numbers = law.numbers(time, self.real, (target, source))
+            records = packed[source][RECORDS]
             theirs = tuple(packed[source][name] for name in other)
             parts = found.near[target, source]
 
             def sweep(
                 k: int,
                 numbers: Any = numbers,
+                records: Any = records,
                 theirs: Any = theirs,
                 parts: Any = parts,
-                source: str = source,
             ) -> None:
                 part = parts[k]
-                room: NDArray[Any] = np.empty((len(other), part.longest), self.real)
+                room: NDArray[Any] = np.empty((len(other) + 3, part.longest), self.real)
                 best: NDArray[Any] = np.empty(max(law.nearest, 1), self.real)
                 pick = np.empty(max(law.nearest, 1), np.int64)
-                kernel(
-                    numbers, mine, theirs, *part[:3], source == target, limit, listed, room, best,
-                    pick, out,
-                )  # fmt: skip
+                kernel(numbers, mine, records, theirs, *part[:3], limit, room, best, pick, out)
 
             share(sweep, len(parts))
         return out

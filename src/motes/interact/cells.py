@@ -125,8 +125,10 @@ def columns(
     return position, np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
 
 
-def grid(bounds: NDArray[np.float64], radius: float, box: NDArray[Any]) -> Grid:
-    """Cells for a search within `radius` [m] of points within `bounds` (2, 3) [m].
+def grid(
+    bounds: NDArray[np.float64], radius: float | NDArray[np.float64], box: NDArray[Any]
+) -> Grid:
+    """Cells for a search within `radius` [m], or one for each axis, of points within `bounds`.
 
     Cells are wider than the radius by what rounding can move: distances, also across a border,
     which round with the box, and this calculation. An open axis that would have more than 2^20

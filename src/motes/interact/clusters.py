@@ -1,7 +1,8 @@
-"""Lists of neighbours of clusters: every slot within a radius of any of a cluster's particles.
+"""Lists of neighbours of particles: every slot within a radius of one.
 
-The particles of a cluster share a list, so that its neighbours are gathered once into consecutive
-memory and every particle's sum over them is a loop of vector instructions.
+They are sought cluster by cluster: what may be near any of its particles is gathered once into
+consecutive memory, where every particle looks for its own. Lists are filled up with nobody to whole
+vectors, so that sums over them are vector instructions without a rest.
 """
 
 # mypy: disallow-untyped-decorators=False
@@ -12,22 +13,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.interact.arrange import Arranged
+from motes.interact.arrange import CLUSTER, FAR, Arranged
 from motes.interact.cells import Grid
 from motes.jit import STRICT, jit, share
+from motes.machine.lanes import LANES, pressed
 from motes.memory import allocate
-
-WIDTH = 16
-"""Lists are filled up to a multiple of this: loops over them have no rest."""
 
 
 class Part(NamedTuple):
-    """The lists of consecutive clusters."""
+    """The lists of consecutive particles."""
 
-    cluster: NDArray[np.int32]
-    """(k + 1,) slots at which the clusters begin and, last, end."""
+    begin: int
+    """Slot of the first particle."""
     first: NDArray[np.int64]
-    """(k + 1,) where their lists begin in `entry` and, last, end."""
+    """(k + 1,) where their lists begin in `entry` and, last, end, divided by `LANES`."""
     entry: NDArray[np.int32]
     """Slots of neighbours; the slot after the last stands for nobody."""
     longest: int
@@ -39,12 +38,12 @@ class _Room(NamedTuple):
 
     position: NDArray[Any]
     slot: NDArray[np.int32]
-    hit: NDArray[np.int32]
+    mark: NDArray[np.int32]
 
 
 def _room(points: int, real: Any) -> _Room:
     return _Room(
-        np.empty((3, points), real), np.empty(points, np.int32), np.empty(points, np.int32)
+        np.zeros((3, points), real), np.empty(points, np.int32), np.empty(points, np.int32)
     )
 
 
@@ -136,24 +135,26 @@ def _seek(
     grid: Any,
     inner: Any,
     radius: Any,
+    itself: Any,
     begin: Any,
     room: Any,
     first: Any,
     entry: Any,
 ) -> Any:
-    """Append lists of clusters from `begin` on; returns the first without, and room it needs."""
+    """Append lists of clusters from `begin` on; returns the first without, and what they need."""
     real = position.dtype.type
     limit = real(radius) * real(radius)
     wide = radius * (1 + 2.0**-18)
     n = cells.key.size
     nobody = np.int32(n + ghosts.key.size)
+    far = real(FAR)
     xs, ys, zs = position[0], position[1], position[2]
     cx, cy, cz = cells.position[0], cells.position[1], cells.position[2]
     gx, gy, gz = ghosts.position[0], ghosts.position[1], ghosts.position[2]
     cell_key, cell_table, cell_shift = cells.key, cells.first, cells.shift
     ghost_key, ghost_table, ghost_shift = ghosts.key, ghosts.first, ghosts.shift
     rx, ry, rz = room.position[0], room.position[1], room.position[2]
-    slot, hits = room.slot, room.hit
+    slots, marks = room.slot, room.mark
     for c in range(begin, cluster.size - 1):
         a, b = cluster[c], cluster[c + 1]
         low = (np.float64(xs[a]), np.float64(ys[a]), np.float64(zs[a]))
@@ -164,7 +165,7 @@ def _seek(
             high = (max(high[0], x), max(high[1], y), max(high[2], z))
         points = _collect(
             low, high, wide, grid, cx, cy, cz, cell_key, cell_table, cell_shift, np.int64(0),
-            np.int64(0), rx, ry, rz, slot,
+            np.int64(0), rx, ry, rz, slots,
         )  # fmt: skip
         alone = True
         for axis in range(3):
@@ -172,64 +173,59 @@ def _seek(
         if not alone:
             points = _collect(
                 low, high, wide, grid, gx, gy, gz, ghost_key, ghost_table, ghost_shift, n,
-                points, rx, ry, rz, slot,
+                points, rx, ry, rz, slots,
             )  # fmt: skip
-        total = first[c]
-        if points > slot.size or total + points + WIDTH > entry.size:
-            return c, points
-        hit = hits[:points]
-        hit[:] = np.int32(0)
+        size = (points + LANES - 1) // LANES * LANES
+        total = LANES * first[a - cluster[0]]
+        if size > slots.size or total + (b - a) * (size + LANES) > entry.size:
+            return c, size
+        for q in range(points, size):
+            rx[q], slots[q] = far, nobody
+        slot, mark = slots[:size], marks[:size]
         for i in range(a, b):
             x, y, z = xs[i], ys[i], zs[i]
-            for q in range(hit.size):
+            me = np.int32(i) if itself else np.int32(-1)
+            for q in range(mark.size):
                 dx, dy, dz = x - rx[q], y - ry[q], z - rz[q]
-                hit[q] |= np.int32(dx * dx + dy * dy + dz * dz <= limit)
-        new = np.uint64(total)
-        for q in range(hit.size):
-            entry[new] = slot[q]
-            new += np.uint64(hit[q])
-        while (new - np.uint64(total)) % np.uint64(WIDTH):
-            entry[new] = nobody
-            new += np.uint64(1)
-        first[c + 1] = np.int64(new)
+                near = (dx * dx + dy * dy + dz * dz <= limit) & (slot[q] != me)
+                mark[q] = np.int32(near)
+            found = pressed(slot, mark, entry[total:])
+            full = (found + LANES - 1) // LANES * LANES
+            for q in range(total + found, total + full):
+                entry[q] = nobody
+            total += full
+            first[i - cluster[0] + 1] = total // LANES
     return cluster.size - 1, np.int64(0)
 
 
-def lists(
-    targets: Arranged,
-    sources: Arranged,
-    cut: Grid,
-    radius: float,
-    old: list[Part] | None = None,
-) -> list[Part]:
-    """Every cluster's neighbours among the sources within `radius` [m], itself among them.
-
-    Lists go into the memory of `old` ones where that is large enough.
-    """
+def lists(targets: Arranged, sources: Arranged, cut: Grid, radius: float) -> list[Part]:
+    """Every particle's neighbours among the sources within `radius` [m], without itself."""
     position = targets.real.position
     real = position.dtype.type
     parts: list[Any] = [None] * len(targets.clusters)
 
     def seek(k: int) -> None:
         cluster = targets.clusters[k]
-        first = np.zeros(cluster.size, np.int64)
-        given = old[k].entry if old and k < len(old) else None
-        entry = np.empty(32 * (cluster[-1] - cluster[0] + 1), np.int32) if given is None else given
+        many = int(cluster[-1] - cluster[0])
+        first = np.zeros(many + 1, np.int64)
+        entry = np.empty(96 * many, np.int32)
         room, begin = _room(1024, real), 0
         while begin < cluster.size - 1:
             begin, points = _seek(
                 position, cluster, sources.real, sources.ghosts, cut, sources.inner, float(radius),
-                begin, room, first, entry,
+                targets is sources, begin, room, first, entry,
             )  # fmt: skip
             if points > room.slot.size:
                 room = _room(2 * points, real)
-            if first[begin] + points + WIDTH > entry.size:
-                share_done = (begin + 1) / (cluster.size - 1)
-                size = int(1.2 * (first[begin] + points + WIDTH) / min(share_done, 1.0))
-                larger = allocate((size,), np.int32, "a list of neighbours")
-                larger[: first[begin]] = entry[: first[begin]]
+            done = int(cluster[begin] - cluster[0])
+            needed = LANES * int(first[done]) + CLUSTER * (points + LANES)
+            if begin < cluster.size - 1 and needed > entry.size:
+                size = int(1.1 * needed * many / max(done, 1)) if done > many // 8 else 2 * needed
+                larger = allocate((max(size, needed),), np.int32, "a list of neighbours")
+                larger[: LANES * first[done]] = entry[: LANES * first[done]]
                 entry = larger
-        parts[k] = Part(cluster, first, entry, int(np.diff(first).max(initial=1)))
+        longest = LANES * int(np.diff(first).max(initial=1))
+        parts[k] = Part(int(cluster[0]), first, entry[: LANES * first[-1]], longest)
 
     share(seek, len(parts))
     return parts

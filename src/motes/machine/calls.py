@@ -20,6 +20,7 @@ from motes.machine.kinds import (
     Unsupported,
     of_dtype,
 )
+from motes.machine.lanes import pressed, pressing, taken_apart, taking
 from motes.machine.memory import Memory
 from motes.machine.values import Group, Known, Scalar, Value, View, type_of
 
@@ -210,6 +211,40 @@ class Calls(Memory):
         """Address of memory that is given back when the function returns."""
         raise NotImplementedError
 
+    def written(self, name: str, text: str) -> None:
+        """See to it that the module holds a function whose text is known."""
+        raise NotImplementedError
+
+    def taken_apart(self, records: Value, slots: Value, *columns: Value) -> Value:
+        """`lanes.taken_apart`."""
+        views = self._packed(records, slots, *columns)
+        item = views[0].type.item
+        if views[0].type.axes != 2 or item.kind != "f" or views[1].type.item.bits != 32:
+            raise Unsupported("records of real numbers are taken apart, by numbers of 32 bits")
+        name = f"taken_apart.{item.llvm}"
+        self.written(name, taking(item.llvm))
+        x, y, z = (f"ptr {view.address}" for view in views[2:])
+        given = f"ptr {views[0].address}, ptr {views[1].address}, i64 {views[1].shape[0]}"
+        self.line(f"call void @{name}({given}, {x}, {y}, {z})")
+        return Known(None)
+
+    def pressed(self, values: Value, marks: Value, out: Value) -> Value:
+        """`lanes.pressed`."""
+        from motes.machine.target import moves_lanes
+
+        views = self._packed(values, marks, out)
+        if any(view.type.item.bits != 32 for view in views):
+            raise Unsupported("values and marks are of 32 bits")
+        self.written("pressed", pressing(moves_lanes()))
+        a, b, c = (f"ptr {view.address}" for view in views)
+        return Scalar(INT, self.do(f"call i64 @pressed({a}, {b}, i64 {views[0].shape[0]}, {c})"))
+
+    def _packed(self, *values: Value) -> list[View]:
+        views = [value for value in values if isinstance(value, View) and value.type.packed]
+        if len(views) != len(values):
+            raise Unsupported("only packed arrays are taken here")
+        return views
+
 
 def _thing(value: Value) -> Any:
     if not isinstance(value, Known):
@@ -249,6 +284,8 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     np.rint: _intrinsic("roundeven"),
     enumerate: Calls.numbered,
     math.fabs: _intrinsic("fabs"),
+    taken_apart: Calls.taken_apart,
+    pressed: Calls.pressed,
 }
 """Handlers by the function itself."""
 

@@ -28,6 +28,8 @@ class Module:
 
     def __init__(self) -> None:
         self.declarations: set[str] = set()
+        self.known: dict[str, str] = {}
+        """Functions whose text does not follow from Python's, by name."""
         self._functions: dict[Any, tuple[str, Type] | None] = {}
         self._texts: list[str] = []
         self._memory: dict[Number, int] = {}
@@ -67,7 +69,8 @@ class Module:
             first = 2 * number + 1
             tables.append(f'!{first} = !{{!"{item.name}", !0, i64 0}}')
             tables.append(f"!{first + 1} = !{{!{first}, !{first}, i64 0}}")
-        parts = [*sorted(self.declarations), *self._texts, door(name, result, kinds), *tables]
+        written = [*self.known.values(), *self._texts]
+        parts = [*sorted(self.declarations), *written, door(name, result, kinds), *tables]
         return "\n".join(parts)
 
 

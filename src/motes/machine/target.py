@@ -25,6 +25,11 @@ def processor() -> tuple[str, str, str]:
     return triple, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
 
 
+def moves_lanes() -> bool:
+    """Whether the processor permutes a vector's eight lanes by those of another (AVX2)."""
+    return "+avx2" in processor()[2].split(",")
+
+
 def identity() -> str:
     """What object code depends on besides its text."""
     return repr((llvmlite.__version__, binding.llvm_version_info, LEVEL, processor()))
