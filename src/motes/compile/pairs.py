@@ -42,7 +42,12 @@ class Law:
         self.nearest = int(nearest)
         self.rebuild = int(part.values["rebuild"].document())
         self.owner = f'interaction "{part.name}"'
-        self._last: tuple[float, dict[tuple[str, str], dict[str, Any]]] = (float("nan"), {})
+        values = part.values.values()
+        self.lasting = all(isinstance(control, Setting | Constant) for control in values)
+        """Whether its numbers are the same at all times."""
+        self._time = float("nan")
+        self._values_now: dict[tuple[str, str], dict[str, Any]] = {}
+        self._numbers_now: dict[Any, NDArray[Any]] = {}
         self._missing()
 
     def _missing(self) -> None:
@@ -63,13 +68,17 @@ class Law:
 
         `pair`: target and source, for laws that mix what two species have.
         """
-        if self._last[0] != time:
-            self._last = time, {}
+        self._at(time)
         if type(self.part).kernel("mixed") is None:
             pair = ("", "")
-        if pair not in self._last[1]:
-            self._last[1][pair] = self._values(time, pair)
-        return self._last[1][pair]
+        if pair not in self._values_now:
+            self._values_now[pair] = self._values(time, pair)
+        return self._values_now[pair]
+
+    def _at(self, time: float) -> None:
+        """Forget what was known of another time."""
+        if self._time != time and not (self.lasting and self._values_now):
+            self._time, self._values_now, self._numbers_now = time, {}, {}
 
     def _values(self, time: float, pair: tuple[str, str]) -> dict[str, Any]:
 
@@ -105,8 +114,12 @@ class Law:
 
     def numbers(self, time: float, real: type, pair: tuple[str, str] = ("", "")) -> NDArray[Any]:
         """All numbers of `p`, as kernels read them."""
-        values = self.values(time, pair)
-        return np.array([x for key in self._fields for x in np.atleast_1d(values[key])], real)
+        self._at(time)
+        if (real, pair) not in self._numbers_now:
+            values = self.values(time, pair)
+            numbers = [x for key in self._fields for x in np.atleast_1d(values[key])]
+            self._numbers_now[real, pair] = np.array(numbers, real)
+        return self._numbers_now[real, pair]
 
     # ------------------------------------------------------------------ fields of particles
 
@@ -172,7 +185,7 @@ class Law:
             width = _returned(self._kernel("near"), self.owner)
             writer.sweep("near", writer.call("near"), width)
         writer.finish(width)
-        extra = {"uint64": np.uint64, "uint32": np.uint32, "choose": choose}
+        extra = {"int64": np.int64, "uint64": np.uint64, "uint32": np.uint32, "choose": choose}
         return text.module({**extra, "taken_apart": taken_apart}), width
 
 
@@ -212,7 +225,7 @@ class Writer:
                 and isinstance(control, Setting)
                 and isinstance(control.value, int | float)
             }
-            if all(isinstance(c, Setting | Constant) for c in law.part.values.values()):
+            if law.lasting:
                 settings |= {k: (0.0,) for k in ("slope", "shift") if law.values(0.0).get(k) == 0.0}
             known = settings if settings and can_fold(function) else None
             self._names[name] = self.text.translation.add(function, law.owner, known)
@@ -231,12 +244,16 @@ class Writer:
         own, sums = self.own, range(width)
         other = tuple(n for n in self.other if n not in AXES)
         lines = (
-            f"@kernel\ndef sweep_{what}(numbers, targets, records, sources, begin, first, entry, "
-            "limit, room, best, pick, out):\n"
+            f"@kernel\ndef sweep_{what}(numbers, targets, records, sources, limit, out, "
+            "begin, first, entry, longest):\n"
+            f"    room = empty(({len(other) + 3}, longest), F)\n"
             f"    p = {self.p()}\n    quarter = F(0.25) * limit\n"
         )
         lines += "".join(f"    t_{n} = targets[{i}]\n" for i, n in enumerate(own))
         lines += "".join(f"    s_{n} = sources[{i}]\n" for i, n in enumerate(other))
+        if self.law.nearest:
+            lines += f"    best, pick = empty({self.law.nearest}, F), "
+            lines += f"empty({self.law.nearest}, int64)\n"
         lines += "    for k in range(uint64(first.size - 1)):\n"
         lines += "        i = uint64(begin) + k\n"
         lines += f"        low, high = {LANES} * first[k], {LANES} * first[k + 1]\n"

@@ -21,7 +21,7 @@ from motes.group.lasting import Body, Class, Lasting, Lists
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, Packing, arrange, common_grid, wrapped
 from motes.interact.clusters import lists
-from motes.jit import blocks, share
+from motes.jit import blocks, each
 from motes.memory import allocate
 
 ALIKE = 1.5
@@ -30,7 +30,7 @@ ALIKE = 1.5
 RECORDS = "records"
 """Name of the places of all slots, x, y, z and a fourth number that nobody reads."""
 
-ROWS = 1 << 14
+ROWS = 1 << 15
 """Rows of one task of a loop that is quick."""
 
 
@@ -243,22 +243,8 @@ class Nearby:
             numbers = law.numbers(time, self.real, (target, source))
             records = packed[source][RECORDS]
             theirs = tuple(packed[source][name] for name in other)
-            parts = found.near[target, source]
-
-            def sweep(
-                k: int,
-                numbers: Any = numbers,
-                records: Any = records,
-                theirs: Any = theirs,
-                parts: Any = parts,
-            ) -> None:
-                part = parts[k]
-                room: NDArray[Any] = np.empty((len(other) + 3, part.longest), self.real)
-                best: NDArray[Any] = np.empty(max(law.nearest, 1), self.real)
-                pick = np.empty(max(law.nearest, 1), np.int64)
-                kernel(numbers, mine, records, theirs, *part[:3], limit, room, best, pick, out)
-
-            share(sweep, len(parts))
+            head = numbers, mine, records, theirs, limit, out
+            each(kernel, head, found.near[target, source])
         return out
 
     def _push(
@@ -271,8 +257,7 @@ class Nearby:
             sums = self._summed(law, law.summed, target, sources, time, found, packed)
             mine = tuple(packed[target][name] for name in law.fields[0])
             order, push = found.arranged[target].order, pushes[target]
-            parts = blocks(order.size, ROWS)
-            share(lambda k: law.finish(numbers, mine, sums, order, push, *parts[k]), len(parts))  # noqa: B023
+            each(law.finish, (numbers, mine, sums, order, push), blocks(order.size, ROWS))
 
     # ------------------------------------------------------------------ measures
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.interact.cells import Cells, Grid, grid, sort
-from motes.jit import STRICT, blocks, jit, share
+from motes.jit import STRICT, blocks, each, jit, share
 
 FINER = np.array([4.0, 1.0, 1.0])
 """Cells per reach along each axis: what is near is in nine rows of cells along x, of which short
@@ -28,7 +28,7 @@ SMALLEST_PART = 1 << 11
 LARGEST_PART = 1 << 14
 """Particles of one task."""
 
-ROWS = 1 << 14
+ROWS = 1 << 15
 """Slots of one task of a loop that is quick."""
 
 
@@ -43,7 +43,7 @@ class Box(NamedTuple):
     @property
     def shortest(self) -> float:
         """The shortest period, infinite where there is none [m]."""
-        return float(np.min(np.where(self.size > 0, self.size, np.inf)))
+        return min((s for s in self.size.tolist() if s > 0), default=float("inf"))
 
 
 OPEN = Box(np.zeros(3), np.zeros(3))
@@ -61,6 +61,8 @@ class Arranged(NamedTuple):
     """(g,) slots of the particles that ghosts are images of."""
     image: NDArray[np.uint8]
     """(g,) which of the 27 periodic boxes around a ghost is in."""
+    shift: NDArray[Any]
+    """(27, 3) ways from a particle to its images in the boxes around, its own the middle one [m]."""
     inner: NDArray[np.float64]
     """(2, 3) the box's lowest and highest coordinates; ghosts are outside [m]."""
     clusters: list[NDArray[np.int32]]
@@ -103,21 +105,23 @@ def common_grid(positions: list[NDArray[Any]], reach: float, periodic: Box) -> G
 def arrange(position: NDArray[Any], cut: Grid, reach: float, periodic: Box) -> Arranged:
     """Arrange particles (3, n) that lie within the box, with ghosts up to `reach` outside [m]."""
     real = sort(position, cut)
-    place, of, image = _ghosts(real.position, reach, periodic)
+    shift = _boxes(periodic).astype(position.dtype)
+    place, of, image = _ghosts(real.position, reach, periodic, shift)
     ghosts = sort(place, cut)
     edges = np.where(
         periodic.size > 0, [periodic.low, periodic.low + periodic.size], [[-np.inf], [np.inf]]
     )
     clusters = _clusters(real, cut, reach)
-    return Arranged(real.row, real, ghosts, of[ghosts.row], image[ghosts.row], edges, clusters)
+    of, image = of[ghosts.row], image[ghosts.row]
+    return Arranged(real.row, real, ghosts, of, image, shift, edges, clusters)
 
 
 def _ghosts(
-    position: NDArray[Any], reach: float, periodic: Box
+    position: NDArray[Any], reach: float, periodic: Box, shift: NDArray[Any]
 ) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[np.uint8]]:
     """Places (3, g) of images beyond the borders, of whom they are images, and in which box."""
     parts = blocks(position.shape[1], ROWS)
-    low, size, shifts = periodic.low, periodic.size, boxes(periodic).astype(position.dtype)
+    low, size = periodic.low, periodic.size
     borders = np.stack([low + reach, low + size - reach])
     counts = np.zeros(len(parts) + 1, np.int64)
 
@@ -130,14 +134,14 @@ def _ghosts(
     of, image = np.empty(place.shape[1], np.int32), np.empty(place.shape[1], np.uint8)
     share(
         lambda k: _write_images(
-            position, borders, size, shifts, *parts[k], int(ends[k]), place, of, image
+            position, borders, size, shift, *parts[k], int(ends[k]), place, of, image
         ),
         len(parts) if place.size else 0,
     )
     return place, of, image
 
 
-def boxes(periodic: Box) -> NDArray[np.float64]:
+def _boxes(periodic: Box) -> NDArray[np.float64]:
     """Ways (27, 3) from a particle to its images in the boxes around [m]; box 13 is its own."""
     steps = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(27, 3)
     found: NDArray[np.float64] = steps * periodic.size
@@ -239,16 +243,14 @@ class Packing(NamedTuple):
         """
         arranged = self.arranged
         n = arranged.order.size
-        size, shifts = self.periodic.size.astype(out.dtype), boxes(self.periodic).astype(out.dtype)
+        size = self.periodic.size.astype(out.dtype)
         parts, images = blocks(n, ROWS), blocks(arranged.ghost_of.size, ROWS)
         moved = np.zeros(len(parts) + 1)
 
-        def pack(k: int) -> None:
-            moved[k] = _pack(position, arranged.order, arranged.real.position, size, out, *parts[k])
-
-        share(pack, len(parts))
+        head = position, arranged.order, arranged.real.position, size, out, moved
+        each(_pack, head, [(k, *part) for k, part in enumerate(parts)])
         of, image = arranged.ghost_of, arranged.image
-        share(lambda k: _pack_images(out, of, image, shifts, n, *images[k]), len(images))
+        each(_pack_images, (out, of, image, arranged.shift, n), images)
         out[-1] = FAR
         return float(moved.max())
 
@@ -265,7 +267,10 @@ FAR = 1e15
 
 
 @jit
-def _pack(position: Any, order: Any, then: Any, size: Any, out: Any, begin: Any, end: Any) -> Any:
+def _pack(
+    position: Any, order: Any, then: Any, size: Any, out: Any, moved: Any, part: Any, begin: Any,
+    end: Any,
+) -> None:  # fmt: skip
     most = out.dtype.type(0)
     for i in range(np.uint64(begin), np.uint64(end)):
         row = np.uint64(order[i])
@@ -280,7 +285,7 @@ def _pack(position: Any, order: Any, then: Any, size: Any, out: Any, begin: Any,
             away2 += away * away
         if not away2 <= most:
             most = away2  # Not a number counts as far.
-    return most
+    moved[part] = most
 
 
 @jit

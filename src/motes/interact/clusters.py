@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from motes.interact.arrange import CLUSTER, FAR, Arranged
 from motes.interact.cells import Grid
 from motes.jit import STRICT, jit, share
-from motes.machine.lanes import LANES, pressed
+from motes.machine.lanes import LANES, near_slots
 from motes.memory import allocate
 
 
@@ -38,13 +38,10 @@ class _Room(NamedTuple):
 
     position: NDArray[Any]
     slot: NDArray[np.int32]
-    mark: NDArray[np.int32]
 
 
 def _room(points: int, real: Any) -> _Room:
-    return _Room(
-        np.zeros((3, points), real), np.empty(points, np.int32), np.empty(points, np.int32)
-    )
+    return _Room(np.zeros((3, points), real), np.empty(points, np.int32))
 
 
 @jit(inline=True, flags=STRICT)
@@ -154,7 +151,7 @@ def _seek(
     cell_key, cell_table, cell_shift = cells.key, cells.first, cells.shift
     ghost_key, ghost_table, ghost_shift = ghosts.key, ghosts.first, ghosts.shift
     rx, ry, rz = room.position[0], room.position[1], room.position[2]
-    slots, marks = room.slot, room.mark
+    slots = room.slot
     for c in range(begin, cluster.size - 1):
         a, b = cluster[c], cluster[c + 1]
         low = (np.float64(xs[a]), np.float64(ys[a]), np.float64(zs[a]))
@@ -181,15 +178,11 @@ def _seek(
             return c, size
         for q in range(points, size):
             rx[q], slots[q] = far, nobody
-        slot, mark = slots[:size], marks[:size]
+        px, py, pz, slot = rx[:size], ry[:size], rz[:size], slots[:size]
         for i in range(a, b):
             x, y, z = xs[i], ys[i], zs[i]
             me = np.int32(i) if itself else np.int32(-1)
-            for q in range(mark.size):
-                dx, dy, dz = x - rx[q], y - ry[q], z - rz[q]
-                near = (dx * dx + dy * dy + dz * dz <= limit) & (slot[q] != me)
-                mark[q] = np.int32(near)
-            found = pressed(slot, mark, entry[total:])
+            found = near_slots(x, y, z, limit, me, px, py, pz, slot, entry[total:])
             full = (found + LANES - 1) // LANES * LANES
             for q in range(total + found, total + full):
                 entry[q] = nobody

@@ -14,13 +14,14 @@ from motes.machine.kinds import (
     BOOL,
     DOUBLE,
     INT,
+    INT32,
     NUMBERS,
     Array,
     Number,
     Unsupported,
     of_dtype,
 )
-from motes.machine.lanes import pressed, pressing, taken_apart, taking
+from motes.machine.lanes import SEEKING_NEEDS, near_slots, seeking, taken_apart, taking
 from motes.machine.memory import Memory
 from motes.machine.values import Group, Known, Scalar, Value, View, type_of
 
@@ -228,16 +229,24 @@ class Calls(Memory):
         self.line(f"call void @{name}({given}, {x}, {y}, {z})")
         return Known(None)
 
-    def pressed(self, values: Value, marks: Value, out: Value) -> Value:
-        """`lanes.pressed`."""
+    def near_slots(self, *given: Value) -> Value:
+        """`lanes.near_slots`."""
         from motes.machine.target import moves_lanes
 
-        views = self._packed(values, marks, out)
-        if any(view.type.item.bits != 32 for view in views):
-            raise Unsupported("values and marks are of 32 bits")
-        self.written("pressed", pressing(moves_lanes()))
-        a, b, c = (f"ptr {view.address}" for view in views)
-        return Scalar(INT, self.do(f"call i64 @pressed({a}, {b}, i64 {views[0].shape[0]}, {c})"))
+        if not moves_lanes():
+            return self.call_function(near_slots, near_slots, given)
+        views = self._packed(*given[5:])
+        item = views[0].type.item
+        numbers = [self.cast(self._number(value), item).text for value in given[:4]]
+        me = self.cast(self._number(given[4]), INT32).text
+        for declaration in SEEKING_NEEDS:
+            self.declare(declaration)
+        name = f"near_slots.{item.llvm}"
+        self.written(name, seeking(item.llvm))
+        passed = [f"{item.llvm} {number}" for number in numbers]
+        passed += [f"i32 {me}", *(f"ptr {view.address}" for view in views[:4])]
+        passed += [f"i64 {views[3].shape[0]}", f"ptr {views[4].address}"]
+        return Scalar(INT, self.do(f"call i64 @{name}({', '.join(passed)})"))
 
     def _packed(self, *values: Value) -> list[View]:
         views = [value for value in values if isinstance(value, View) and value.type.packed]
@@ -285,7 +294,7 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     enumerate: Calls.numbered,
     math.fabs: _intrinsic("fabs"),
     taken_apart: Calls.taken_apart,
-    pressed: Calls.pressed,
+    near_slots: Calls.near_slots,
 }
 """Handlers by the function itself."""
 

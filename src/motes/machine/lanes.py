@@ -1,11 +1,13 @@
 """What loops over single numbers cannot say: data that changes places between a vector's lanes.
 
 Two functions that kernels call. In plain Python they are what their source says; to the compiler
-they are LLVM's text, written here for eight lanes at a time.
+they are LLVM's text, written here for eight lanes at a time. No instruction has a flag that lets
+it round otherwise than IEEE 754 says.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 LANES = 8
@@ -22,16 +24,19 @@ def taken_apart(records: Any, slots: Any, x: Any, y: Any, z: Any) -> None:
         x[q], y[q], z[q] = records[k, 0], records[k, 1], records[k, 2]
 
 
-def pressed(values: Any, marks: Any, out: Any) -> int:
-    """Write the values whose mark is not 0, in order, and return how many there are.
+def near_slots(
+    x: Any, y: Any, z: Any, limit: Any, me: Any, xs: Any, ys: Any, zs: Any, slots: Any, out: Any
+) -> int:
+    """Write the slots of the points within a square of a distance from x, y, z, but `me`, in order.
 
-    Both are of 32 bits and as many as a multiple of `LANES`; up to `LANES` - 1 numbers of `out`
-    after the last may change.
+    Returns how many there are. `slots` are of 32 bits and, with the points, as many as a multiple
+    of `LANES`; up to `LANES` numbers of `out` after the last may change.
     """
     new = 0
-    for q in range(values.size):
-        if marks[q] != 0:
-            out[new] = values[q]
+    for q in range(slots.size):
+        dx, dy, dz = x - xs[q], y - ys[q], z - zs[q]
+        if dx * dx + dy * dy + dz * dz <= limit and slots[q] != me:
+            out[new] = slots[q]
             new += 1
     return new
 
@@ -39,111 +44,150 @@ def pressed(values: Any, marks: Any, out: Any) -> int:
 def taking(real: str) -> str:
     """LLVM's text of `taken_apart` for one precision."""
     wide = real == "double"
-    step = 4 if wide else LANES
-    four, all_ = f"<4 x {real}>", f"<{step} x {real}>"
-    lines = [
+    step, line = (4, 2) if wide else (LANES, 4)
+    text = _Text(
         f"define internal void @taken_apart.{real}(ptr %records, ptr %slots, i64 %n, ptr %x, "
-        "ptr %y, ptr %z) alwaysinline nounwind {",
-        "head:\n  br label %top",
-        "top:\n  %q = phi i64 [ 0, %head ], [ %next, %body ]",
-        "  %more = icmp slt i64 %q, %n\n  br i1 %more, label %body, label %done",
-        "body:\n  %from = getelementptr inbounds i32, ptr %slots, i64 %q",
-    ]
+        "ptr %y, ptr %z) alwaysinline nounwind {"
+    )
+    text.begin()
+    text.add("%from = getelementptr inbounds i32, ptr %slots, i64 %q")
+    parts = []
     for k in range(step):
-        lines += [
-            f"  %p{k} = getelementptr inbounds i32, ptr %from, i64 {k}",
-            f"  %s{k} = load i32, ptr %p{k}",
-            f"  %w{k} = zext i32 %s{k} to i64",
-            f"  %a{k} = getelementptr inbounds {four}, ptr %records, i64 %w{k}",
-            f"  %r{k} = load {four}, ptr %a{k}, align 16",
-        ]
-
-    def shuffle(to: str, kind: str, a: str, b: str, order: tuple[int, ...]) -> None:
-        mask = ", ".join(f"i32 {i}" for i in order)
-        lines.append(
-            f"  {to} = shufflevector {kind} {a}, {kind} {b}, <{len(order)} x i32> <{mask}>"
+        text.add(
+            f"%p{k} = getelementptr inbounds i32, ptr %from, i64 {k}",
+            f"%s{k} = load i32, ptr %p{k}",
+            f"%w{k} = zext i32 %s{k} to i64",
+            f"%a{k} = getelementptr inbounds <4 x {real}>, ptr %records, i64 %w{k}",
         )
+    # Halves of 16 bytes go straight to where they are wanted; only a lane's neighbours change.
+    for half in range(2 if wide else 1):
+        for k in range(step):
+            at = f"%a{k}"
+            if half:
+                at = text.do(f"getelementptr inbounds {real}, ptr {at}, i64 {line}")
+            parts.append(text.do(f"load <{line} x {real}>, ptr {at}, align 16"))
+    small, whole = f"<{line} x {real}>", f"<{step} x {real}>"
+    both, pairs = tuple(range(2 * line)), step // 2
 
-    rows = [f"%r{k}" for k in range(4)]
-    if not wide:
-        rows = [f"%b{k}" for k in range(4)]
-        for k in range(4):
-            shuffle(rows[k], four, f"%r{k}", f"%r{k + 4}", tuple(range(8)))
-
-    def halves(*order: int) -> tuple[int, ...]:
-        """Places in a vector, and in its other half the same; of the second vector from 4 on."""
+    def joined(half: int) -> list[str]:
+        first = half * step
         if wide:
-            return order
-        first = tuple(i if i < 4 else i + 4 for i in order)
-        return (*first, *(i + 4 for i in first))
+            order = [(0, 2), (1, 3)]
+        else:
+            order = [(k, k + 4) for k in range(pairs)]
+        return [text.shuffle(small, parts[first + a], parts[first + b], both) for a, b in order]
 
-    for to, a, b, order in (
-        ("%xy0", 0, 1, (0, 4, 1, 5)), ("%xy1", 2, 3, (0, 4, 1, 5)),
-        ("%zw0", 0, 1, (2, 6, 3, 7)), ("%zw1", 2, 3, (2, 6, 3, 7)),
-    ):  # fmt: skip
-        shuffle(to, all_, rows[a], rows[b], halves(*order))
-    shuffle("%vx", all_, "%xy0", "%xy1", halves(0, 1, 4, 5))
-    shuffle("%vy", all_, "%xy0", "%xy1", halves(2, 3, 6, 7))
-    shuffle("%vz", all_, "%zw0", "%zw1", halves(0, 1, 4, 5))
-    for axis in "xyz":
-        lines.append(f"  %o{axis} = getelementptr inbounds {real}, ptr %{axis}, i64 %q")
-        lines.append(f"  store {all_} %v{axis}, ptr %o{axis}, align {8 if wide else 4}")
-    lines.append(f"  %next = add nsw i64 %q, {step}\n  br label %top")
-    return "\n".join([*lines, "done:\n  ret void\n}"])
+    if wide:
+        xy, zw = joined(0), joined(1)
+        found = [
+            text.shuffle(whole, *xy, (0, 4, 2, 6)),
+            text.shuffle(whole, *xy, (1, 5, 3, 7)),
+            text.shuffle(whole, *zw, (0, 4, 2, 6)),
+        ]
+    else:
+        a, b, c, d = joined(0)
+        low, high = (0, 8, 1, 9, 4, 12, 5, 13), (2, 10, 3, 11, 6, 14, 7, 15)
+        first, second = (0, 1, 8, 9, 4, 5, 12, 13), (2, 3, 10, 11, 6, 7, 14, 15)
+        xy = [text.shuffle(whole, a, b, low), text.shuffle(whole, c, d, low)]
+        zw = [text.shuffle(whole, a, b, high), text.shuffle(whole, c, d, high)]
+        found = [
+            text.shuffle(whole, *xy, first),
+            text.shuffle(whole, *xy, second),
+            text.shuffle(whole, *zw, first),
+        ]
+    for axis, value in zip("xyz", found, strict=True):
+        at = text.do(f"getelementptr inbounds {real}, ptr %{axis}, i64 %q")
+        text.add(f"store {whole} {value}, ptr {at}, align {8 if wide else 4}")
+    text.end(step)
+    return text.whole("ret void")
 
 
-def pressing(moves_lanes: bool) -> str:
-    """LLVM's text of `pressed`; with a processor that moves lanes by a vector, eight at once."""
-    return _pressing_eight() if moves_lanes else _pressing_one()
-
-
-def _pressing_eight() -> str:
+def seeking(real: str) -> str:
+    """LLVM's text of `near_slots`, for a processor that moves lanes by a vector (AVX2)."""
+    wide = real == "double"
+    step = 4 if wide else LANES
+    kind = f"<{step} x {real}>"
     rows = []
     for mark in range(256):
-        chosen = [k for k in range(8) if mark >> k & 1]
-        order = ", ".join(f"i32 {k}" for k in (chosen + [0] * 8)[:8])
-        rows.append(f"<8 x i32> <{order}>")
-    table = ", ".join(rows)
-    return (
-        f"@orders = internal constant [256 x <8 x i32>] [{table}], align 32\n"
-        "declare <8 x i32> @llvm.x86.avx2.permd(<8 x i32>, <8 x i32>)\n"
-        "declare i8 @llvm.ctpop.i8(i8)\n"
-        "define internal i64 @pressed(ptr %values, ptr %marks, i64 %n, ptr %out) alwaysinline "
-        "nounwind {\nhead:\n  br label %top\n"
-        "top:\n  %q = phi i64 [ 0, %head ], [ %next, %body ]\n"
-        "  %new = phi i64 [ 0, %head ], [ %sum, %body ]\n"
-        "  %more = icmp slt i64 %q, %n\n  br i1 %more, label %body, label %done\n"
-        "body:\n  %m = getelementptr inbounds i32, ptr %marks, i64 %q\n"
-        "  %mark = load <8 x i32>, ptr %m, align 4\n"
-        "  %on = icmp ne <8 x i32> %mark, zeroinitializer\n"
-        "  %bits = bitcast <8 x i1> %on to i8\n  %place = zext i8 %bits to i64\n"
-        "  %o = getelementptr inbounds <8 x i32>, ptr @orders, i64 %place\n"
-        "  %order = load <8 x i32>, ptr %o, align 32\n"
-        "  %v = getelementptr inbounds i32, ptr %values, i64 %q\n"
-        "  %value = load <8 x i32>, ptr %v, align 4\n"
-        "  %kept = call <8 x i32> @llvm.x86.avx2.permd(<8 x i32> %value, <8 x i32> %order)\n"
-        "  %to = getelementptr inbounds i32, ptr %out, i64 %new\n"
-        "  store <8 x i32> %kept, ptr %to, align 4\n"
-        "  %few = call i8 @llvm.ctpop.i8(i8 %bits)\n  %many = zext i8 %few to i64\n"
-        "  %sum = add nsw i64 %new, %many\n"
-        f"  %next = add nsw i64 %q, {LANES}\n  br label %top\n"
-        "done:\n  ret i64 %new\n}"
+        chosen = [k for k in range(LANES) if mark >> k & 1]
+        rows.append(f"<8 x i32> <{', '.join(f'i32 {k}' for k in (chosen + [0] * LANES)[:LANES])}>")
+    text = _Text(
+        f"@orders.{real} = internal constant [256 x <8 x i32>] [{', '.join(rows)}], align 32\n"
+        f"define internal i64 @near_slots.{real}({real} %x, {real} %y, {real} %z, "
+        f"{real} %limit, i32 %me, ptr %xs, ptr %ys, ptr %zs, ptr %slots, i64 %n, ptr %out) "
+        "alwaysinline nounwind {"
     )
+    own = {name: text.spread(kind, real, f"%{name}", step) for name in ("x", "y", "z", "limit")}
+    me = text.spread("<8 x i32>", "i32", "%me", LANES)
+    text.begin(carried=("%new", "%sum"))
+    near = []
+    for begin in range(0, LANES, step):
+        squares = []
+        for axis in "xyz":
+            at = text.do(f"getelementptr inbounds {real}, ptr %{axis}s, i64 %q")
+            if begin:
+                at = text.do(f"getelementptr inbounds {real}, ptr {at}, i64 {begin}")
+            other = text.do(f"load {kind}, ptr {at}, align {8 if wide else 4}")
+            away = text.do(f"fsub {kind} {own[axis]}, {other}")
+            squares.append(text.do(f"fmul {kind} {away}, {away}"))
+        total = text.do(f"fadd {kind} {squares[0]}, {squares[1]}")
+        total = text.do(f"fadd {kind} {total}, {squares[2]}")
+        near.append(text.do(f"fcmp ole {kind} {total}, {own['limit']}"))
+    inside = near[0] if not wide else text.shuffle("<4 x i1>", *near, tuple(range(LANES)))
+    at = text.do("getelementptr inbounds i32, ptr %slots, i64 %q")
+    slot = text.do(f"load <8 x i32>, ptr {at}, align 4")
+    others = text.do(f"icmp ne <8 x i32> {slot}, {me}")
+    chosen_ = text.do(f"and <8 x i1> {inside}, {others}")
+    bits = text.do(f"bitcast <8 x i1> {chosen_} to i8")
+    place = text.do(f"zext i8 {bits} to i64")
+    at = text.do(f"getelementptr inbounds <8 x i32>, ptr @orders.{real}, i64 {place}")
+    order = text.do(f"load <8 x i32>, ptr {at}, align 32")
+    kept = text.do(f"call <8 x i32> @llvm.x86.avx2.permd(<8 x i32> {slot}, <8 x i32> {order})")
+    at = text.do("getelementptr inbounds i32, ptr %out, i64 %new")
+    few = text.do(f"call i8 @llvm.ctpop.i8(i8 {bits})")
+    many = text.do(f"zext i8 {few} to i64")
+    text.add(f"store <8 x i32> {kept}, ptr {at}, align 4", f"%sum = add nsw i64 %new, {many}")
+    text.end(LANES)
+    return text.whole("ret i64 %new")
 
 
-def _pressing_one() -> str:
-    return (
-        "define internal i64 @pressed(ptr %values, ptr %marks, i64 %n, ptr %out) alwaysinline "
-        "nounwind {\nhead:\n  br label %top\n"
-        "top:\n  %q = phi i64 [ 0, %head ], [ %next, %body ]\n"
-        "  %new = phi i64 [ 0, %head ], [ %sum, %body ]\n"
-        "  %more = icmp slt i64 %q, %n\n  br i1 %more, label %body, label %done\n"
-        "body:\n  %m = getelementptr inbounds i32, ptr %marks, i64 %q\n"
-        "  %mark = load i32, ptr %m\n  %on = icmp ne i32 %mark, 0\n"
-        "  %v = getelementptr inbounds i32, ptr %values, i64 %q\n  %value = load i32, ptr %v\n"
-        "  %to = getelementptr inbounds i32, ptr %out, i64 %new\n"
-        "  store i32 %value, ptr %to\n"
-        "  %one = zext i1 %on to i64\n  %sum = add nsw i64 %new, %one\n"
-        "  %next = add nsw i64 %q, 1\n  br label %top\n"
-        "done:\n  ret i64 %new\n}"
-    )
+SEEKING_NEEDS = (
+    "declare <8 x i32> @llvm.x86.avx2.permd(<8 x i32>, <8 x i32>)",
+    "declare i8 @llvm.ctpop.i8(i8)",
+)
+"""What `seeking` calls."""
+
+
+class _Text:
+    """Lines of one function that loops over %q up to %n."""
+
+    def __init__(self, head: str) -> None:
+        self.lines, self._number = [head, "head:"], 0
+
+    def add(self, *lines: str) -> None:
+        self.lines += lines
+
+    def do(self, text: str) -> str:
+        self._number += 1
+        self.add(f"%t{self._number} = {text}")
+        return f"%t{self._number}"
+
+    def shuffle(self, kind: str, a: str, b: str, order: Sequence[int]) -> str:
+        mask = ", ".join(f"i32 {k}" for k in order)
+        return self.do(f"shufflevector {kind} {a}, {kind} {b}, <{len(order)} x i32> <{mask}>")
+
+    def spread(self, kind: str, item: str, value: str, lanes: int) -> str:
+        one = self.do(f"insertelement {kind} poison, {item} {value}, i64 0")
+        return self.shuffle(kind, one, "poison", [0] * lanes)
+
+    def begin(self, carried: tuple[str, str] | None = None) -> None:
+        self.add("br label %top", "top:", "%q = phi i64 [ 0, %head ], [ %next, %body ]")
+        if carried:
+            self.add(f"{carried[0]} = phi i64 [ 0, %head ], [ {carried[1]}, %body ]")
+        self.add("%more = icmp slt i64 %q, %n", "br i1 %more, label %body, label %done", "body:")
+
+    def end(self, step: int) -> None:
+        self.add(f"%next = add nsw i64 %q, {step}", "br label %top")
+
+    def whole(self, last: str) -> str:
+        return "\n".join([*self.lines, "done:", last, "}"])
