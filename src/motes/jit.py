@@ -126,27 +126,23 @@ class Kernel:
 
         return bound
 
-    def each(self, head: Sequence[Any], tails: Sequence[Sequence[Any]]) -> None:
+    def each(self, head: Sequence[Any], calls: Calls) -> None:
         """Call with `(*head, *tail)` for every tail, on the threads, which take the next one each
         without asking Python; no two calls may write one element."""
         from motes.machine.door import spread
 
-        if not tails:
+        tails = calls.tails
+        if len(tails) < 2:
+            for tail in tails:
+                self(*head, *tail)
             return
         key: list[Any] = []
         numbers: list[Any] = []
         for argument in head:
             spread(argument, key, numbers)
-        lasts, whole = [], key
-        for k, tail in enumerate(tails):
-            found: list[Any] = key.copy()
-            lasts.append([])
-            for argument in tail:
-                spread(argument, found, lasts[-1])
-            if k and found != whole:
-                raise TypeError(f"{self!r}: all calls must have arguments of the same types")
-            whole = found
-        door = self._doors.get(tuple(whole)) or self._open(tuple(whole), (*head, *tails[0]))
+        last, lasts = calls.spread()
+        whole = (*key, *last)
+        door = self._doors.get(whole) or self._open(whole, (*head, *tails[0]))
         run = None if door is self else door.each(numbers, lasts)
         if run is None:
             share(lambda k: self(*head, *tails[k]), len(tails))
@@ -193,12 +189,39 @@ def bound(kernel: Callable[..., Any], *arguments: Any) -> Callable[..., Any]:
     return kernel.bind(*arguments) if isinstance(kernel, Kernel) else partial(kernel, *arguments)
 
 
-def each(kernel: Any, head: Sequence[Any], tails: Sequence[Sequence[Any]]) -> None:
+class Calls:
+    """The last arguments of many calls of a kernel, of the same types in all of them."""
+
+    def __init__(self, tails: Sequence[Sequence[Any]]) -> None:
+        self.tails = tails
+        self._spread: tuple[list[Any], list[list[Any]]] | None = None
+
+    def spread(self) -> tuple[list[Any], list[list[Any]]]:
+        """What the arguments' types follow from, and their numbers for every call."""
+        from motes.machine.door import spread
+
+        if self._spread is None:
+            first: list[Any] = []
+            lasts: list[list[Any]] = []
+            for tail in self.tails:
+                key: list[Any] = []
+                lasts.append([])
+                for argument in tail:
+                    spread(argument, key, lasts[-1])
+                first = first or key
+                if key != first:
+                    raise TypeError("all calls must have arguments of the same types")
+            self._spread = first, lasts
+        return self._spread
+
+
+def each(kernel: Any, head: Sequence[Any], tails: Calls | Sequence[Sequence[Any]]) -> None:
     """Call a kernel that returns nothing with `(*head, *tail)` for every tail, on the threads."""
+    calls = tails if isinstance(tails, Calls) else Calls(tails)
     if isinstance(kernel, Kernel):
-        kernel.each(head, tails)
+        kernel.each(head, calls)
     else:
-        share(lambda k: kernel(*head, *tails[k]), len(tails))
+        share(lambda k: kernel(*head, *calls.tails[k]), len(calls.tails))
 
 
 # ---------------------------------------------------------------------------- kernel cache

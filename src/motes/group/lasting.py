@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from motes.compile.pairs import Law
 from motes.control.curve import Curve
 from motes.interact.arrange import Arranged, Box
-from motes.interact.clusters import Part
+from motes.jit import Calls
 from motes.state import Particles
 from motes.step import Stepper
 
@@ -54,6 +54,10 @@ class Body:
         return self.stepper.trait(name, self.rows, self.alive, self.time)
 
 
+Near = dict[tuple[str, str], Calls]
+"""Lists by target and source: the parts that loops over them are called with."""
+
+
 @dataclass(frozen=True)
 class Lists:
     """The neighbour lists of laws that share them."""
@@ -61,8 +65,7 @@ class Lists:
     radius: float
     """What is within it is listed [m]."""
     arranged: dict[str, Arranged]
-    near: dict[tuple[str, str], list[Part]]
-    """Lists by target and source."""
+    near: Near
     kept: dict[str, tuple[int, int]]
     """Rows and deaths for which they hold."""
     step: int = 0

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from motes.compile.pairs import FORCE, POTENTIAL, VIRIAL, Law
 from motes.compile.text import AXES
 from motes.errors import SceneError, SimulationError
-from motes.group.lasting import Body, Class, Lasting, Lists
+from motes.group.lasting import Body, Class, Lasting, Lists, Near
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, Packing, arrange, common_grid, wrapped
 from motes.interact.clusters import lists
-from motes.jit import blocks, each
+from motes.jit import Calls, blocks, each
 from motes.memory import allocate
 
 ALIKE = 1.5
@@ -133,11 +133,13 @@ class Nearby:
         memory.lists[k] = replace(settled, settled=True)
 
     def _build(self, k: int, bodies: dict[str, Body], memory: Lasting, step: int) -> None:
-        memory.lists[k] = replace(self.build(self.classes[k], bodies), step=step)
+        old = memory.lists[k]
+        found = self.build(self.classes[k], bodies, old.near if old else None)
+        memory.lists[k] = replace(found, step=step)
         memory.builds += 1
 
-    def build(self, shared: Class, bodies: dict[str, Body]) -> Lists:
-        """Lists for the laws of a class, of bodies as they are."""
+    def build(self, shared: Class, bodies: dict[str, Body], last: Near | None = None) -> Lists:
+        """Lists for the laws of a class, of bodies as they are; the last ones tell how long."""
         time = next(iter(bodies.values())).time
         radius = shared.radius(time, self.periodic)
         positions = {}
@@ -150,7 +152,10 @@ class Nearby:
             positions[name] = position
         cut = common_grid(list(positions.values()), radius, self.periodic)
         arranged = {n: arrange(p, cut, radius, self.periodic) for n, p in positions.items()}
-        near = {(a, b): lists(arranged[a], arranged[b], cut, radius) for a, b in shared.pairs}
+        near = {}
+        for a, b in shared.pairs:
+            old = last[a, b].tails if last else None
+            near[a, b] = Calls(lists(arranged[a], arranged[b], cut, radius, old))
         kept = {name: _kept(bodies[name]) for name in shared.systems}
         return Lists(radius, arranged, near, kept)
 

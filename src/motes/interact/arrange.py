@@ -75,20 +75,25 @@ class Arranged(NamedTuple):
 
 
 @jit(flags=STRICT)
-def wrap(x: Any, low: Any, size: Any) -> None:
+def _wrap(position: Any, low: Any, size: Any, begin: Any, end: Any) -> None:
     """Take coordinates into [low, low + size), in place."""
-    for i in range(x.size):
-        away = x[i] - low
-        if not (0 <= away < size):
-            value = x[i] - size * np.floor(away / size)
-            x[i] = value if low <= value < low + size else low
+    for axis in range(3):
+        first, length = low[axis], size[axis]
+        if length > 0:
+            x = position[axis][begin:end]
+            for i in range(x.size):
+                away = x[i] - first
+                if not (0 <= away < length):
+                    value = x[i] - length * np.floor(away / length)
+                    x[i] = value if first <= value < first + length else first
 
 
 def wrapped(position: NDArray[Any], periodic: Box) -> None:
     """Take positions (3, n) [m] into the box, in place."""
-    real, axes = position.dtype.type, np.flatnonzero(periodic.size)
-    low, size = periodic.low.astype(real), periodic.size.astype(real)
-    share(lambda k: wrap(position[axes[k]], low[axes[k]], size[axes[k]]), len(axes))
+    if periodic.size.any():
+        real = position.dtype.type
+        head = position, periodic.low.astype(real), periodic.size.astype(real)
+        each(_wrap, head, blocks(position.shape[1], ROWS))
 
 
 def common_grid(positions: list[NDArray[Any]], reach: float, periodic: Box) -> Grid:
@@ -201,20 +206,18 @@ def part_size(n: int) -> int:
 def _clusters(cells: Cells, cut: Grid, reach: float) -> list[NDArray[np.int32]]:
     n = cells.row.size
     parts = blocks(n, part_size(n))
-    found: list[Any] = [None] * len(parts)
-
-    def divide(k: int) -> None:
-        begin, end = parts[k]
-        room = np.empty(end - begin + 1, np.int32)
-        count = _cut(cells.key, cells.position[0], cut.shape[0], reach, begin, end, room)
-        found[k] = room[:count]
-
-    share(divide, len(parts))
-    return found
+    rooms = [np.empty(end - begin + 1, np.int32) for begin, end in parts]
+    counts = np.zeros(len(parts), np.int64)
+    head = cells.key, cells.position[0], cut.shape[0], reach, counts
+    each(_cut, head, [(k, *part, rooms[k]) for k, part in enumerate(parts)])
+    return [room[:count] for room, count in zip(rooms, counts.tolist(), strict=True)]
 
 
 @jit(flags=STRICT)
-def _cut(key: Any, x: Any, along: Any, wide: Any, begin: Any, end: Any, first: Any) -> Any:
+def _cut(
+    key: Any, x: Any, along: Any, wide: Any, counts: Any, part: Any, begin: Any, end: Any,
+    first: Any,
+) -> None:  # fmt: skip
     """Begin a cluster where one is full, a row of cells ends, or it would be wider than `wide`."""
     number, start, row = 0, begin, np.int64(-1)
     left = right = x.dtype.type(0)
@@ -226,7 +229,7 @@ def _cut(key: Any, x: Any, along: Any, wide: Any, begin: Any, end: Any, first: A
             first[number] = i
             number, start, row, left, right = number + 1, i, own, x[i], x[i]
     first[number] = end
-    return number + 1
+    counts[part] = number + 1
 
 
 class Packing(NamedTuple):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from motes.interact.arrange import CLUSTER, FAR, Arranged
 from motes.interact.cells import Grid
-from motes.jit import STRICT, jit, share
+from motes.jit import STRICT, each, jit
 from motes.machine.lanes import LANES, near_slots
 from motes.memory import allocate
 
@@ -126,19 +126,20 @@ def _collect(
 @jit(flags=STRICT)
 def _seek(
     position: Any,
-    cluster: Any,
     cells: Any,
     ghosts: Any,
     grid: Any,
     inner: Any,
     radius: Any,
     itself: Any,
-    begin: Any,
+    state: Any,
+    part: Any,
+    cluster: Any,
     room: Any,
     first: Any,
     entry: Any,
-) -> Any:
-    """Append lists of clusters from `begin` on; returns the first without, and what they need."""
+) -> None:
+    """Append lists of a part's clusters; `state` holds the first without, and what that needs."""
     real = position.dtype.type
     limit = real(radius) * real(radius)
     wide = radius * (1 + 2.0**-18)
@@ -152,7 +153,7 @@ def _seek(
     ghost_key, ghost_table, ghost_shift = ghosts.key, ghosts.first, ghosts.shift
     rx, ry, rz = room.position[0], room.position[1], room.position[2]
     slots = room.slot
-    for c in range(begin, cluster.size - 1):
+    for c in range(state[part, 0], cluster.size - 1):
         a, b = cluster[c], cluster[c + 1]
         low = (np.float64(xs[a]), np.float64(ys[a]), np.float64(zs[a]))
         high = low
@@ -175,7 +176,8 @@ def _seek(
         size = (points + LANES - 1) // LANES * LANES
         total = LANES * first[a - cluster[0]]
         if size > slots.size or total + (b - a) * (size + LANES) > entry.size:
-            return c, size
+            state[part, 0], state[part, 1] = c, size
+            return
         for q in range(points, size):
             rx[q], slots[q] = far, nobody
         px, py, pz, slot = rx[:size], ry[:size], rz[:size], slots[:size]
@@ -188,37 +190,54 @@ def _seek(
                 entry[q] = nobody
             total += full
             first[i - cluster[0] + 1] = total // LANES
-    return cluster.size - 1, np.int64(0)
+    state[part, 0] = cluster.size - 1
 
 
-def lists(targets: Arranged, sources: Arranged, cut: Grid, radius: float) -> list[Part]:
-    """Every particle's neighbours among the sources within `radius` [m], without itself."""
+def lists(
+    targets: Arranged, sources: Arranged, cut: Grid, radius: float, last: list[Part] | None = None
+) -> list[Part]:
+    """Every particle's neighbours among the sources within `radius` [m], without itself.
+
+    Lists of before, `last`, tell how much room there should be.
+    """
     position = targets.real.position
     real = position.dtype.type
-    parts: list[Any] = [None] * len(targets.clusters)
-
-    def seek(k: int) -> None:
-        cluster = targets.clusters[k]
+    state = np.zeros((len(targets.clusters), 2), np.int64)
+    head = (
+        position, sources.real, sources.ghosts, cut, sources.inner, float(radius),
+        targets is sources, state,
+    )  # fmt: skip
+    work = []
+    for k, cluster in enumerate(targets.clusters):
         many = int(cluster[-1] - cluster[0])
-        first = np.zeros(many + 1, np.int64)
-        entry = np.empty(96 * many, np.int32)
-        room, begin = _room(1024, real), 0
-        while begin < cluster.size - 1:
-            begin, points = _seek(
-                position, cluster, sources.real, sources.ghosts, cut, sources.inner, float(radius),
-                targets is sources, begin, room, first, entry,
-            )  # fmt: skip
-            if points > room.slot.size:
-                room = _room(2 * points, real)
-            done = int(cluster[begin] - cluster[0])
-            needed = LANES * int(first[done]) + CLUSTER * (points + LANES)
-            if begin < cluster.size - 1 and needed > entry.size:
-                size = int(1.1 * needed * many / max(done, 1)) if done > many // 8 else 2 * needed
-                larger = allocate((max(size, needed),), np.int32, "a list of neighbours")
-                larger[: LANES * first[done]] = entry[: LANES * first[done]]
-                entry = larger
+        size = last[k].entry.size * 9 // 8 if last and k < len(last) else 96 * many
+        first, entry = np.zeros(many + 1, np.int64), np.empty(size + 4096, np.int32)
+        work.append((k, cluster, _room(1024, real), first, entry))
+    waiting = work
+    while waiting:
+        each(_seek, head, waiting)
+        waiting = [one for one in work if state[one[0], 0] < one[1].size - 1]
+        for one in waiting:
+            work[one[0]] = _wider(one, *state[one[0]].tolist(), real)
+        waiting = [work[one[0]] for one in waiting]
+    parts = []
+    for _, cluster, _, first, entry in work:
         longest = LANES * int(np.diff(first).max(initial=1))
-        parts[k] = Part(int(cluster[0]), first, entry[: LANES * first[-1]], longest)
-
-    share(seek, len(parts))
+        parts.append(Part(int(cluster[0]), first, entry[: LANES * int(first[-1])], longest))
     return parts
+
+
+def _wider(one: Any, begin: int, points: int, real: Any) -> Any:
+    """A part's work with room to go on."""
+    k, cluster, room, first, entry = one
+    if points > room.slot.size:
+        room = _room(2 * points, real)
+    done, many = int(cluster[begin] - cluster[0]), int(cluster[-1] - cluster[0])
+    held = LANES * int(first[done])
+    needed = held + CLUSTER * (points + LANES)
+    if needed > entry.size:
+        likely = int(1.1 * needed * many / done) if done > many // 8 else 2 * needed
+        larger = allocate((max(likely, needed),), np.int32, "a list of neighbours")
+        larger[:held] = entry[:held]
+        entry = larger
+    return k, cluster, room, first, entry
