@@ -20,6 +20,10 @@ CAUTION = 1 - 2.0**-10
 """Share of the allowed way after which a list is stale: more than rounding takes away."""
 
 
+SHORT = 0.3
+"""Margin of shortened lists as a share of that of the lists that are built."""
+
+
 @dataclass
 class Body:
     """One system of a group at one stage: `position`, `velocity` (3, n) [m, m/s], its traits."""
@@ -66,12 +70,18 @@ class Lists:
     """What is within it is listed [m]."""
     arranged: dict[str, Arranged]
     near: Near
+    short: Near
+    """What of the lists is used: all, or what was within a smaller radius a while ago."""
     kept: dict[str, tuple[int, int]]
     """Rows and deaths for which they hold."""
     step: int = 0
     """Number of the step in which they were built."""
     columns: dict[tuple[str, str], NDArray[Any]] = field(default_factory=dict)
     """What does not change while they hold, by system and name, in the order of slots."""
+    short_radius: float = 0.0
+    """What was within it then is in the short lists [m]."""
+    marks: dict[str, NDArray[Any]] = field(default_factory=dict)
+    """Where particles (slots + 1, 3) were when the lists were shortened [m]."""
     settled: bool = False
     """Whether rows are in the order of cells."""
 
@@ -101,6 +111,7 @@ class Lasting:
         for part in self.lists:
             for arranged in part.arranged.values() if part else ():
                 yield from (arranged.order, arranged.real.position)
+            yield from part.marks.values() if part else ()
         yield from (self.push or {}).values()
 
 
@@ -132,8 +143,22 @@ class Class:
         )
         return min(wanted, 0.999 * periodic.shortest)
 
+    def shortens(self) -> bool:
+        """Whether lists are shortened between builds: not where these follow a count of steps."""
+        return not any(law.rebuild for law, _, _ in self.laws)
+
     def stale(self, found: Lists, moved: float, time: float, step: int) -> bool:
         """Whether lists may miss a pair after particles have moved [m], or were to last shorter."""
         if every := min(law.rebuild for law, _, _ in self.laws):
             return step - found.step >= every or not np.isfinite(moved)
         return not 2 * moved <= (found.radius - self.reach(time)) * CAUTION
+
+    def short_radius(self, found: Lists, moved: float, time: float) -> float:
+        """Radius to which lists are shortened now, after particles have moved since the build [m].
+
+        No wider than what all pairs within it are listed for; 0 where it is not worth while.
+        """
+        reach = self.reach(time)
+        margin = SHORT * (found.radius - reach)
+        room = (found.radius - 2 * moved) * CAUTION - reach
+        return reach + min(margin, room) if room > margin / 2 > 0 else 0.0

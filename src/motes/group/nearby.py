@@ -7,6 +7,7 @@ particles' ways do not fit into it any more (Verlet, Physical Review 159 (1967) 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -17,10 +18,10 @@ from numpy.typing import NDArray
 from motes.compile.pairs import FORCE, POTENTIAL, VIRIAL, Law
 from motes.compile.text import AXES
 from motes.errors import SceneError, SimulationError
-from motes.group.lasting import Body, Class, Lasting, Lists, Near
+from motes.group.lasting import CAUTION, Body, Class, Lasting, Lists, Near
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, Packing, arrange, common_grid, wrapped
-from motes.interact.clusters import lists
+from motes.interact.clusters import lists, shortened
 from motes.jit import Calls, blocks, each
 from motes.memory import allocate
 
@@ -32,6 +33,10 @@ RECORDS = "records"
 
 ROWS = 1 << 15
 """Rows of one task of a loop that is quick."""
+
+
+Packed = dict[str, dict[str, NDArray[Any]]]
+"""Columns by system and name, in the order of slots."""
 
 
 class Nearby:
@@ -157,7 +162,7 @@ class Nearby:
             old = last[a, b].tails if last else None
             near[a, b] = Calls(lists(arranged[a], arranged[b], cut, radius, old))
         kept = {name: _kept(bodies[name]) for name in shared.systems}
-        return Lists(radius, arranged, near, kept)
+        return Lists(radius, arranged, near, near, kept)
 
     # ------------------------------------------------------------------ sums
 
@@ -173,22 +178,56 @@ class Nearby:
             for law, _, _ in shared.laws:
                 if message := self._too_long(law, time):
                     raise SimulationError(message)
-            found = memory.lists[k]
-            moved = np.inf
-            if found is not None and _holds(found, shared.systems, bodies):
-                packed, moved = self._packed(shared, found, bodies)
-            if found is None or shared.stale(found, moved, time, memory.steps):
-                self._build(k, bodies, memory, memory.steps)
-                found = memory.lists[k]
-                assert found is not None
-                packed, _ = self._packed(shared, found, bodies)
+            found, packed = self._current(k, bodies, memory, time)
             for law, targets, sources in shared.laws:
                 self._push(law, targets, sources, time, found, packed, pushes)
 
+    def _current(
+        self, k: int, bodies: dict[str, Body], memory: Lasting, time: float
+    ) -> tuple[Lists, Packed]:
+        """Lists of a class that miss no pair now, built or shortened anew where they must be."""
+        shared, found = self.classes[k], memory.lists[k]
+        moved = since = math.inf
+        if found is not None and _holds(found, shared.systems, bodies):
+            packed, moved, since = self._packed(shared, found, bodies)
+        if found is None or not math.isfinite(moved):
+            fresh = True
+        elif found.marks:
+            fresh = False
+            if 2 * since <= (found.short_radius - shared.reach(time)) * CAUTION:
+                return found, packed
+        else:
+            fresh = shared.stale(found, moved, time, memory.steps)
+            if not fresh:
+                return found, packed
+        radius = 0.0
+        if not fresh:
+            assert found is not None
+            radius = shared.short_radius(found, moved, time)
+        if not radius:
+            self._build(k, bodies, memory, memory.steps)
+            found = memory.lists[k]
+            assert found is not None
+            packed, _, _ = self._packed(shared, found, bodies)
+            radius = shared.short_radius(found, 0.0, time) if shared.shortens() else 0.0
+        if radius:
+            assert found is not None
+            places = {name: packed[name][RECORDS] for name in shared.systems}
+            short = {
+                (a, b): Calls(shortened(calls.tails, places[a], places[b], radius))
+                for (a, b), calls in found.near.items()
+            }
+            marks = {name: place[:, :3].copy() for name, place in places.items()}
+            found = replace(found, short=short, marks=marks, short_radius=radius)
+            memory.lists[k] = found
+        assert found is not None
+        return found, packed
+
     def _packed(
         self, shared: Class, found: Lists, bodies: dict[str, Body]
-    ) -> tuple[dict[str, dict[str, NDArray[Any]]], float]:
-        """What the laws read of every system in the order of slots; how far one has moved [m].
+    ) -> tuple[Packed, float, float]:
+        """What the laws read of every system in the order of slots; how far one has moved since the
+        lists were built, and since they were shortened [m].
 
         Places come as records (slots + 1, 4), and, as the columns of these, one by one.
         """
@@ -199,14 +238,16 @@ class Nearby:
                 wanted[name] |= set(own)
             for name in sources:
                 wanted[name] |= set(other)
-        packed, moved = {}, 0.0
+        packed: Packed = {}
+        moved = np.zeros(2)
         for name, body in bodies.items():
             if name not in wanted:
                 continue
             packing = Packing(found.arranged[name], self.periodic)
             size = found.arranged[name].slots + 1
             records = self._space((name, "x"), (size, 4))
-            moved = max(moved, packing.positions(body.position, records))
+            mark = found.marks.get(name)
+            moved = np.maximum(moved, packing.positions(body.position, records, mark))
             columns = {RECORDS: records, **dict(zip(AXES, records.T, strict=False))}
             for field_ in sorted(wanted[name] - set(columns)):
                 kept = found.columns.get((name, field_))
@@ -221,7 +262,8 @@ class Nearby:
                         found.columns[name, field_] = room
                 columns[field_] = kept
             packed[name] = columns
-        return packed, float(np.sqrt(moved))
+        built, shortened_ = np.sqrt(moved).tolist()
+        return packed, built, shortened_
 
     def _space(self, key: Any, shape: tuple[int, ...]) -> NDArray[Any]:
         """Room that lasts for one evaluation."""
@@ -234,7 +276,7 @@ class Nearby:
 
     def _summed(
         self, law: Law, what: str, target: str, sources: Iterable[str], time: float,
-        found: Lists, packed: dict[str, dict[str, NDArray[Any]]],
+        found: Lists, packed: Packed,
     ) -> NDArray[Any]:  # fmt: skip
         """Sums (numbers, n) over the neighbours of every particle of a target."""
         n = found.arranged[target].order.size
@@ -249,12 +291,12 @@ class Nearby:
             records = packed[source][RECORDS]
             theirs = tuple(packed[source][name] for name in other)
             head = numbers, mine, records, theirs, limit, out
-            each(kernel, head, found.near[target, source])
+            each(kernel, head, found.short[target, source])
         return out
 
     def _push(
         self, law: Law, targets: Iterable[str], sources: Iterable[str], time: float,
-        found: Lists, packed: dict[str, dict[str, NDArray[Any]]],
+        found: Lists, packed: Packed,
         pushes: dict[str, NDArray[Any]],
     ) -> None:  # fmt: skip
         numbers = law.numbers(time, self.real)
@@ -285,7 +327,7 @@ class Nearby:
                 continue
             part = Class(chosen)
             found = self.build(part, bodies)
-            packed, _ = self._packed(part, found, bodies)
+            packed, _, _ = self._packed(part, found, bodies)
             time = next(iter(bodies.values())).time
             for law, targets, sources in chosen:
                 for target in targets:

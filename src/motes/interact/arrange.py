@@ -62,7 +62,7 @@ class Arranged(NamedTuple):
     image: NDArray[np.uint8]
     """(g,) which of the 27 periodic boxes around a ghost is in."""
     shift: NDArray[Any]
-    """(27, 3) ways from a particle to its images in the boxes around, its own the middle one [m]."""
+    """(27, 3) ways from a particle to its images in the boxes around, itself in the middle [m]."""
     inner: NDArray[np.float64]
     """(2, 3) the box's lowest and highest coordinates; ghosts are outside [m]."""
     clusters: list[NDArray[np.int32]]
@@ -238,24 +238,29 @@ class Packing(NamedTuple):
     arranged: Arranged
     periodic: Box
 
-    def positions(self, position: NDArray[Any], out: NDArray[Any]) -> float:
+    def positions(
+        self, position: NDArray[Any], out: NDArray[Any], mark: NDArray[Any] | None = None
+    ) -> NDArray[np.float64]:
         """Fill (slots + 1, 4) from positions (3, rows): images near where they were arranged.
 
-        Returns the square of the longest way that one has gone [m2]. The last slot is a place far
-        from everything, to fill lists up with.
+        Returns the squares of the longest ways that one has gone since it was arranged, and since
+        it was at its `mark` (slots + 1, 3) [m2]. The last slot is a place far from everything, to fill
+        lists up with.
         """
         arranged = self.arranged
         n = arranged.order.size
         size = self.periodic.size.astype(out.dtype)
         parts, images = blocks(n, ROWS), blocks(arranged.ghost_of.size, ROWS)
-        moved = np.zeros(len(parts) + 1)
-
-        head = position, arranged.order, arranged.real.position, size, out, moved
+        moved = np.zeros((len(parts) + 1, 2))
+        if mark is None:
+            mark = np.empty((0, 3), out.dtype)
+        head = position, arranged.order, arranged.real.position, size, mark, out, moved
         each(_pack, head, [(k, *part) for k, part in enumerate(parts)])
         of, image = arranged.ghost_of, arranged.image
         each(_pack_images, (out, of, image, arranged.shift, n), images)
         out[-1] = FAR
-        return float(moved.max())
+        farthest: NDArray[np.float64] = moved.max(axis=0)
+        return farthest
 
     def values(self, values: NDArray[Any], out: NDArray[Any]) -> None:
         """Fill (slots + 1,) from values (rows,)."""
@@ -271,13 +276,14 @@ FAR = 1e15
 
 @jit
 def _pack(
-    position: Any, order: Any, then: Any, size: Any, out: Any, moved: Any, part: Any, begin: Any,
-    end: Any,
+    position: Any, order: Any, then: Any, size: Any, mark: Any, out: Any, moved: Any, part: Any,
+    begin: Any, end: Any,
 ) -> None:  # fmt: skip
-    most = out.dtype.type(0)
+    most = far = out.dtype.type(0)
+    marked = mark.shape[0] > 0
     for i in range(np.uint64(begin), np.uint64(end)):
         row = np.uint64(order[i])
-        away2 = out.dtype.type(0)
+        away2, since2 = out.dtype.type(0), out.dtype.type(0)
         for axis in range(3):
             x, old = position[axis, row], then[axis, i]
             away, period = x - old, size[axis]
@@ -286,9 +292,13 @@ def _pack(
                 x, away = x - turns, away - turns
             out[i, axis] = x
             away2 += away * away
+            if marked:
+                since2 += (x - mark[i, axis]) ** 2
         if not away2 <= most:
             most = away2  # Not a number counts as far.
-    moved[part] = most
+        if not since2 <= far:
+            far = since2
+    moved[part, 0], moved[part, 1] = most, far
 
 
 @jit

@@ -8,6 +8,7 @@ vectors, so that sums over them are vector instructions without a rest.
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from motes.interact.arrange import CLUSTER, FAR, Arranged
 from motes.interact.cells import Grid
 from motes.jit import STRICT, each, jit
-from motes.machine.lanes import LANES, near_slots
+from motes.machine.lanes import LANES, near_slots, taken_apart
 from motes.memory import allocate
 
 
@@ -241,3 +242,41 @@ def _wider(one: Any, begin: int, points: int, real: Any) -> Any:
         larger[:held] = entry[:held]
         entry = larger
     return k, cluster, room, first, entry
+
+
+@jit(flags=STRICT)
+def _shorten(
+    own: Any, others: Any, limit: Any, begin: Any, first: Any, entry: Any, longest: Any,
+    new_first: Any, new_entry: Any,
+) -> None:  # fmt: skip
+    """Copy those entries of a part's lists that are within a square of a distance."""
+    room = np.empty((3, longest), own.dtype)
+    nobody, total = np.int32(others.shape[0] - 1), np.int64(0)
+    for k in range(first.size - 1):
+        slot = entry[LANES * first[k] : LANES * first[k + 1]]
+        xs, ys, zs = room[0][: slot.size], room[1][: slot.size], room[2][: slot.size]
+        taken_apart(others, slot, xs, ys, zs)
+        x, y, z = own[begin + k, 0], own[begin + k, 1], own[begin + k, 2]
+        out = new_entry[total:]
+        found = near_slots(x, y, z, limit, np.int32(-1), xs, ys, zs, slot, out)
+        full = (found + LANES - 1) // LANES * LANES
+        for q in range(found, full):
+            out[q] = nobody
+        total += full
+        new_first[k + 1] = total // LANES
+
+
+def shortened(
+    parts: Sequence[Part], own: NDArray[Any], others: NDArray[Any], radius: float
+) -> list[Part]:
+    """What of lists is within a smaller radius [m] of places (slots + 1, 4) as they are now."""
+    work = []
+    for part in parts:
+        first, entry = np.zeros_like(part.first), np.empty(part.entry.size + LANES, np.int32)
+        work.append((*part, first, entry))
+    limit = own.dtype.type(radius) ** 2
+    each(_shorten, (own, others, limit), work)
+    return [
+        Part(part.begin, one[-2], one[-1], part.longest)
+        for part, one in zip(parts, work, strict=True)
+    ]
