@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from motes.compile.pairs import Law
 from motes.control.curve import Curve
 from motes.interact.arrange import Arranged, Box
+from motes.interact.clusters import Room
 from motes.jit import Calls
 from motes.state import Particles
 from motes.step import Stepper
@@ -20,7 +21,7 @@ CAUTION = 1 - 2.0**-10
 """Share of the allowed way after which a list is stale: more than rounding takes away."""
 
 
-SHORT = 0.3
+SHORT = 0.4
 """Margin of shortened lists as a share of that of the lists that are built."""
 
 
@@ -81,7 +82,7 @@ class Lists:
     short_radius: float = 0.0
     """What was within it then is in the short lists [m]."""
     marks: dict[str, NDArray[Any]] = field(default_factory=dict)
-    """Where particles (slots + 1, 3) were when the lists were shortened [m]."""
+    """Where particles (n, 4) were when the lists were shortened [m]."""
     settled: bool = False
     """Whether rows are in the order of cells."""
 
@@ -101,10 +102,13 @@ class Lasting:
     """Systems whose rows are scattered, to be moved before the next step."""
     steps: int = 0
     """How many steps were begun."""
+    rooms: dict[Any, Room] = field(default_factory=dict)
+    """Memory of lists that nobody else holds: those that replace them may be written there."""
 
     def copy(self) -> Lasting:
-        """A copy that shares arrays, which are replaced and never written to."""
-        return replace(self, lists=list(self.lists), untidy=set(self.untidy))
+        """A copy that shares arrays, which are replaced and not written to from now on."""
+        self.rooms = {}
+        return replace(self, lists=list(self.lists), untidy=set(self.untidy), rooms={})
 
     def arrays(self) -> Iterator[NDArray[Any]]:
         """Everything that can change the next bit."""

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from motes.compile.pairs import FORCE, POTENTIAL, VIRIAL, Law
 from motes.compile.text import AXES
 from motes.errors import SceneError, SimulationError
-from motes.group.lasting import CAUTION, Body, Class, Lasting, Lists, Near
+from motes.group.lasting import CAUTION, Body, Class, Lasting, Lists
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, Packing, arrange, common_grid, wrapped
-from motes.interact.clusters import lists, shortened
+from motes.interact.clusters import Room, lists, shortened
 from motes.jit import Calls, blocks, each
 from motes.memory import allocate
 
@@ -138,13 +138,14 @@ class Nearby:
         memory.lists[k] = replace(settled, settled=True)
 
     def _build(self, k: int, bodies: dict[str, Body], memory: Lasting, step: int) -> None:
-        old = memory.lists[k]
-        found = self.build(self.classes[k], bodies, old.near if old else None)
-        memory.lists[k] = replace(found, step=step)
+        rooms = {pair: memory.rooms.setdefault((k, pair), []) for pair in self.classes[k].pairs}
+        memory.lists[k] = replace(self.build(self.classes[k], bodies, rooms), step=step)
         memory.builds += 1
 
-    def build(self, shared: Class, bodies: dict[str, Body], last: Near | None = None) -> Lists:
-        """Lists for the laws of a class, of bodies as they are; the last ones tell how long."""
+    def build(
+        self, shared: Class, bodies: dict[str, Body], rooms: dict[Any, Room] | None = None
+    ) -> Lists:
+        """Lists for the laws of a class, of bodies as they are, written into rooms by pair."""
         time = next(iter(bodies.values())).time
         radius = shared.radius(time, self.periodic)
         positions = {}
@@ -159,8 +160,8 @@ class Nearby:
         arranged = {n: arrange(p, cut, radius, self.periodic) for n, p in positions.items()}
         near = {}
         for a, b in shared.pairs:
-            old = last[a, b].tails if last else None
-            near[a, b] = Calls(lists(arranged[a], arranged[b], cut, radius, old))
+            room = rooms[a, b] if rooms else None
+            near[a, b] = Calls(lists(arranged[a], arranged[b], cut, radius, room))
         kept = {name: _kept(bodies[name]) for name in shared.systems}
         return Lists(radius, arranged, near, near, kept)
 
@@ -213,11 +214,11 @@ class Nearby:
         if radius:
             assert found is not None
             places = {name: packed[name][RECORDS] for name in shared.systems}
-            short = {
-                (a, b): Calls(shortened(calls.tails, places[a], places[b], radius))
-                for (a, b), calls in found.near.items()
-            }
-            marks = {name: place[:, :3].copy() for name, place in places.items()}
+            short = {}
+            for (a, b), calls in found.near.items():
+                room = memory.rooms.setdefault((k, a, b, "short"), [])
+                short[a, b] = Calls(shortened(calls.tails, places[a], places[b], radius, room))
+            marks = {n: place[: found.arranged[n].order.size].copy() for n, place in places.items()}
             found = replace(found, short=short, marks=marks, short_radius=radius)
             memory.lists[k] = found
         assert found is not None

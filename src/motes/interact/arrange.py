@@ -81,7 +81,11 @@ def _wrap(position: Any, low: Any, size: Any, begin: Any, end: Any) -> None:
         first, length = low[axis], size[axis]
         if length > 0:
             x = position[axis][begin:end]
-            for i in range(x.size):
+            outside = 0
+            for i in range(x.size):  # Counting is vector instructions.
+                away = x[i] - first
+                outside += (away < 0) | (away >= length)
+            for i in range(x.size if outside else 0):
                 away = x[i] - first
                 if not (0 <= away < length):
                     value = x[i] - length * np.floor(away / length)
@@ -244,7 +248,7 @@ class Packing(NamedTuple):
         """Fill (slots + 1, 4) from positions (3, rows): images near where they were arranged.
 
         Returns the squares of the longest ways that one has gone since it was arranged, and since
-        it was at its `mark` (slots + 1, 3) [m2]. The last slot is a place far from everything, to fill
+        it was at its `mark` (n, 4) [m2]. The last slot is a place far from everything, to fill
         lists up with.
         """
         arranged = self.arranged
@@ -253,7 +257,7 @@ class Packing(NamedTuple):
         parts, images = blocks(n, ROWS), blocks(arranged.ghost_of.size, ROWS)
         moved = np.zeros((len(parts) + 1, 2))
         if mark is None:
-            mark = np.empty((0, 3), out.dtype)
+            mark = np.empty((0, 4), out.dtype)
         head = position, arranged.order, arranged.real.position, size, mark, out, moved
         each(_pack, head, [(k, *part) for k, part in enumerate(parts)])
         of, image = arranged.ghost_of, arranged.image
@@ -294,6 +298,7 @@ def _pack(
             away2 += away * away
             if marked:
                 since2 += (x - mark[i, axis]) ** 2
+        out[i, 3] = 0
         if not away2 <= most:
             most = away2  # Not a number counts as far.
         if not since2 <= far:
@@ -307,6 +312,7 @@ def _pack_images(out: Any, of: Any, image: Any, shift: Any, n: Any, begin: Any, 
         i, k, to = np.uint64(of[g]), np.uint64(image[g]), np.uint64(n) + g
         for axis in range(3):
             out[to, axis] = out[i, axis] + shift[k, axis]
+        out[to, 3] = 0
 
 
 @jit

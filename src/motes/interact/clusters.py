@@ -34,15 +34,19 @@ class Part(NamedTuple):
     """Length of the longest list."""
 
 
-class _Room(NamedTuple):
+Room = list[NDArray[np.int32]]
+"""Memory for entries of consecutive parts, to be used again for lists that replace those in it."""
+
+
+class _Candidates(NamedTuple):
     """Candidates of one cluster."""
 
     position: NDArray[Any]
     slot: NDArray[np.int32]
 
 
-def _room(points: int, real: Any) -> _Room:
-    return _Room(np.zeros((3, points), real), np.empty(points, np.int32))
+def _candidates(points: int, real: Any) -> _Candidates:
+    return _Candidates(np.zeros((3, points), real), np.empty(points, np.int32))
 
 
 @jit(inline=True, flags=STRICT)
@@ -195,11 +199,11 @@ def _seek(
 
 
 def lists(
-    targets: Arranged, sources: Arranged, cut: Grid, radius: float, last: list[Part] | None = None
+    targets: Arranged, sources: Arranged, cut: Grid, radius: float, room: Room | None = None
 ) -> list[Part]:
     """Every particle's neighbours among the sources within `radius` [m], without itself.
 
-    Lists of before, `last`, tell how much room there should be.
+    Entries go into `room` where that is large enough.
     """
     position = targets.real.position
     real = position.dtype.type
@@ -211,9 +215,8 @@ def lists(
     work = []
     for k, cluster in enumerate(targets.clusters):
         many = int(cluster[-1] - cluster[0])
-        size = last[k].entry.size * 9 // 8 if last and k < len(last) else 96 * many
-        first, entry = np.zeros(many + 1, np.int64), np.empty(size + 4096, np.int32)
-        work.append((k, cluster, _room(1024, real), first, entry))
+        entry = room[k] if room and k < len(room) else np.empty(96 * many + 4096, np.int32)
+        work.append((k, cluster, _candidates(1024, real), np.zeros(many + 1, np.int64), entry))
     waiting = work
     while waiting:
         each(_seek, head, waiting)
@@ -222,6 +225,8 @@ def lists(
             work[one[0]] = _wider(one, *state[one[0]].tolist(), real)
         waiting = [work[one[0]] for one in waiting]
     parts = []
+    if room is not None:
+        room[:] = [one[-1] for one in work]
     for _, cluster, _, first, entry in work:
         longest = LANES * int(np.diff(first).max(initial=1))
         parts.append(Part(int(cluster[0]), first, entry[: LANES * int(first[-1])], longest))
@@ -232,7 +237,7 @@ def _wider(one: Any, begin: int, points: int, real: Any) -> Any:
     """A part's work with room to go on."""
     k, cluster, room, first, entry = one
     if points > room.slot.size:
-        room = _room(2 * points, real)
+        room = _candidates(2 * points, real)
     done, many = int(cluster[begin] - cluster[0]), int(cluster[-1] - cluster[0])
     held = LANES * int(first[done])
     needed = held + CLUSTER * (points + LANES)
@@ -267,16 +272,16 @@ def _shorten(
 
 
 def shortened(
-    parts: Sequence[Part], own: NDArray[Any], others: NDArray[Any], radius: float
+    parts: Sequence[Part], own: NDArray[Any], others: NDArray[Any], radius: float, room: Room
 ) -> list[Part]:
     """What of lists is within a smaller radius [m] of places (slots + 1, 4) as they are now."""
-    work = []
-    for part in parts:
-        first, entry = np.zeros_like(part.first), np.empty(part.entry.size + LANES, np.int32)
-        work.append((*part, first, entry))
+    for k, part in enumerate(parts):
+        needed = part.entry.size + LANES
+        if k >= len(room):
+            room.append(np.empty(needed, np.int32))
+        elif room[k].size < needed:
+            room[k] = np.empty(needed + needed // 16, np.int32)
+    work = [(*part, np.zeros_like(part.first), room[k]) for k, part in enumerate(parts)]
     limit = own.dtype.type(radius) ** 2
     each(_shorten, (own, others, limit), work)
-    return [
-        Part(part.begin, one[-2], one[-1], part.longest)
-        for part, one in zip(parts, work, strict=True)
-    ]
+    return [Part(begin, first, entry, most) for begin, _, _, most, first, entry in work]
