@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from motes.compile.pairs import Law
 from motes.control.curve import Curve
 from motes.interact.arrange import Arranged, Box
-from motes.interact.clusters import Room
+from motes.interact.clusters import Clusters
 from motes.jit import Calls
 from motes.state import Particles
 from motes.step import Stepper
@@ -22,7 +22,7 @@ CAUTION = 1 - 2.0**-10
 
 
 SHORT = 0.4
-"""Margin of shortened lists as a share of that of the lists that are built."""
+"""Margin of the lists of particles as a share of that of the lists of clusters."""
 
 
 @dataclass
@@ -59,10 +59,6 @@ class Body:
         return self.stepper.trait(name, self.rows, self.alive, self.time)
 
 
-Near = dict[tuple[str, str], Calls]
-"""Lists by target and source: the parts that loops over them are called with."""
-
-
 @dataclass(frozen=True)
 class Lists:
     """The neighbour lists of laws that share them."""
@@ -70,19 +66,20 @@ class Lists:
     radius: float
     """What is within it is listed [m]."""
     arranged: dict[str, Arranged]
-    near: Near
-    short: Near
-    """What of the lists is used: all, or what was within a smaller radius a while ago."""
+    near: dict[tuple[str, str], list[Clusters]]
+    """Lists of clusters by target and source."""
     kept: dict[str, tuple[int, int]]
     """Rows and deaths for which they hold."""
     step: int = 0
     """Number of the step in which they were built."""
     columns: dict[tuple[str, str], NDArray[Any]] = field(default_factory=dict)
     """What does not change while they hold, by system and name, in the order of slots."""
+    short: dict[tuple[str, str], Calls] = field(default_factory=dict)
+    """Lists of particles by target and source: parts that loops over them are called with."""
     short_radius: float = 0.0
-    """What was within it then is in the short lists [m]."""
+    """What was within it when they were chosen is in them [m]."""
     marks: dict[str, NDArray[Any]] = field(default_factory=dict)
-    """Where particles (n, 4) were when the lists were shortened [m]."""
+    """Where particles (n, 4) were then [m]."""
     settled: bool = False
     """Whether rows are in the order of cells."""
 
@@ -102,7 +99,7 @@ class Lasting:
     """Systems whose rows are scattered, to be moved before the next step."""
     steps: int = 0
     """How many steps were begun."""
-    rooms: dict[Any, Room] = field(default_factory=dict)
+    rooms: dict[Any, Any] = field(default_factory=dict)
     """Memory of lists that nobody else holds: those that replace them may be written there."""
 
     def copy(self) -> Lasting:
@@ -147,22 +144,22 @@ class Class:
         )
         return min(wanted, 0.999 * periodic.shortest)
 
-    def shortens(self) -> bool:
-        """Whether lists are shortened between builds: not where these follow a count of steps."""
-        return not any(law.rebuild for law, _, _ in self.laws)
-
-    def stale(self, found: Lists, moved: float, time: float, step: int) -> bool:
-        """Whether lists may miss a pair after particles have moved [m], or were to last shorter."""
+    def good(self, found: Lists, moved: float, time: float, step: int) -> bool:
+        """Whether lists of particles miss no pair after these have moved [m], or last longer."""
+        if not found.short or not math.isfinite(moved):
+            return False
         if every := min(law.rebuild for law, _, _ in self.laws):
-            return step - found.step >= every or not np.isfinite(moved)
-        return not 2 * moved <= (found.radius - self.reach(time)) * CAUTION
+            return step - found.step < every
+        return 2 * moved <= (found.short_radius - self.reach(time)) * CAUTION
 
     def short_radius(self, found: Lists, moved: float, time: float) -> float:
-        """Radius to which lists are shortened now, after particles have moved since the build [m].
+        """Radius for lists of particles that are chosen now, after a way [m] since the build.
 
         No wider than what all pairs within it are listed for; 0 where it is not worth while.
         """
         reach = self.reach(time)
+        if any(law.rebuild for law, _, _ in self.laws) or not math.isfinite(moved):
+            return 0.0
         margin = SHORT * (found.radius - reach)
         room = (found.radius - 2 * moved) * CAUTION - reach
         return reach + min(margin, room) if room > margin / 2 > 0 else 0.0

@@ -7,7 +7,6 @@ particles' ways do not fit into it any more (Verlet, Physical Review 159 (1967) 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -18,10 +17,10 @@ from numpy.typing import NDArray
 from motes.compile.pairs import FORCE, POTENTIAL, VIRIAL, Law
 from motes.compile.text import AXES
 from motes.errors import SceneError, SimulationError
-from motes.group.lasting import CAUTION, Body, Class, Lasting, Lists
+from motes.group.lasting import Body, Class, Lasting, Lists
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, Packing, arrange, common_grid, wrapped
-from motes.interact.clusters import Room, lists, shortened
+from motes.interact.clusters import Room, cluster_lists, particle_lists
 from motes.jit import Calls, blocks, each
 from motes.memory import allocate
 
@@ -138,14 +137,14 @@ class Nearby:
         memory.lists[k] = replace(settled, settled=True)
 
     def _build(self, k: int, bodies: dict[str, Body], memory: Lasting, step: int) -> None:
-        rooms = {pair: memory.rooms.setdefault((k, pair), []) for pair in self.classes[k].pairs}
+        rooms = {pair: memory.rooms.setdefault((k, *pair), []) for pair in self.classes[k].pairs}
         memory.lists[k] = replace(self.build(self.classes[k], bodies, rooms), step=step)
         memory.builds += 1
 
     def build(
         self, shared: Class, bodies: dict[str, Body], rooms: dict[Any, Room] | None = None
     ) -> Lists:
-        """Lists for the laws of a class, of bodies as they are, written into rooms by pair."""
+        """Lists of clusters for the laws of a class, of bodies as they are, in rooms by pair."""
         time = next(iter(bodies.values())).time
         radius = shared.radius(time, self.periodic)
         positions = {}
@@ -160,10 +159,23 @@ class Nearby:
         arranged = {n: arrange(p, cut, radius, self.periodic) for n, p in positions.items()}
         near = {}
         for a, b in shared.pairs:
-            room = rooms[a, b] if rooms else None
-            near[a, b] = Calls(lists(arranged[a], arranged[b], cut, radius, room))
+            room = rooms[a, b] if rooms else []
+            near[a, b] = cluster_lists(arranged[a], arranged[b], cut, radius, room)
         kept = {name: _kept(bodies[name]) for name in shared.systems}
-        return Lists(radius, arranged, near, near, kept)
+        return Lists(radius, arranged, near, kept)
+
+    def _chosen(
+        self, shared: Class, found: Lists, packed: Packed, radius: float, rooms: dict[Any, Room]
+    ) -> Lists:
+        """Lists with those of particles, within a radius [m] of where they are now."""
+        places = {name: packed[name][RECORDS] for name in shared.systems}
+        short = {}
+        for (a, b), lists in found.near.items():
+            room = rooms.setdefault((a, b), [])
+            parts = particle_lists(lists, places[a], places[b], radius, a == b, room)
+            short[a, b] = Calls(parts)
+        marks = {n: place[: found.arranged[n].order.size].copy() for n, place in places.items()}
+        return replace(found, short=short, marks=marks, short_radius=radius)
 
     # ------------------------------------------------------------------ sums
 
@@ -188,40 +200,21 @@ class Nearby:
     ) -> tuple[Lists, Packed]:
         """Lists of a class that miss no pair now, built or shortened anew where they must be."""
         shared, found = self.classes[k], memory.lists[k]
-        moved = since = math.inf
+        radius = 0.0
         if found is not None and _holds(found, shared.systems, bodies):
             packed, moved, since = self._packed(shared, found, bodies)
-        if found is None or not math.isfinite(moved):
-            fresh = True
-        elif found.marks:
-            fresh = False
-            if 2 * since <= (found.short_radius - shared.reach(time)) * CAUTION:
+            if shared.good(found, since, time, memory.steps):
                 return found, packed
-        else:
-            fresh = shared.stale(found, moved, time, memory.steps)
-            if not fresh:
-                return found, packed
-        radius = 0.0
-        if not fresh:
-            assert found is not None
             radius = shared.short_radius(found, moved, time)
         if not radius:
             self._build(k, bodies, memory, memory.steps)
             found = memory.lists[k]
             assert found is not None
             packed, _, _ = self._packed(shared, found, bodies)
-            radius = shared.short_radius(found, 0.0, time) if shared.shortens() else 0.0
-        if radius:
-            assert found is not None
-            places = {name: packed[name][RECORDS] for name in shared.systems}
-            short = {}
-            for (a, b), calls in found.near.items():
-                room = memory.rooms.setdefault((k, a, b, "short"), [])
-                short[a, b] = Calls(shortened(calls.tails, places[a], places[b], radius, room))
-            marks = {n: place[: found.arranged[n].order.size].copy() for n, place in places.items()}
-            found = replace(found, short=short, marks=marks, short_radius=radius)
-            memory.lists[k] = found
+            radius = shared.short_radius(found, 0.0, time) or found.radius
         assert found is not None
+        rooms = memory.rooms.setdefault((k,), {})
+        found = memory.lists[k] = self._chosen(shared, found, packed, radius, rooms)
         return found, packed
 
     def _packed(
@@ -329,6 +322,7 @@ class Nearby:
             part = Class(chosen)
             found = self.build(part, bodies)
             packed, _, _ = self._packed(part, found, bodies)
+            found = self._chosen(part, found, packed, found.radius, {})
             time = next(iter(bodies.values())).time
             for law, targets, sources in chosen:
                 for target in targets:

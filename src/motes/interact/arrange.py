@@ -92,12 +92,12 @@ def _wrap(position: Any, low: Any, size: Any, begin: Any, end: Any) -> None:
                     x[i] = value if first <= value < first + length else first
 
 
-def wrapped(position: NDArray[Any], periodic: Box) -> None:
-    """Take positions (3, n) [m] into the box, in place."""
+def wrapped(position: NDArray[Any], periodic: Box, count: int | None = None) -> None:
+    """Take the first positions (3, n) [m], or all, into the box, in place."""
     if periodic.size.any():
         real = position.dtype.type
         head = position, periodic.low.astype(real), periodic.size.astype(real)
-        each(_wrap, head, blocks(position.shape[1], ROWS))
+        each(_wrap, head, blocks(position.shape[1] if count is None else count, ROWS))
 
 
 def common_grid(positions: list[NDArray[Any]], reach: float, periodic: Box) -> Grid:
