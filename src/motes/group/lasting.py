@@ -133,6 +133,11 @@ class Class:
         """Systems that take part."""
         return sorted({name for pair in self.pairs for name in pair})
 
+    @property
+    def every(self) -> int:
+        """Steps between builds of lists, 0 where they follow from how far particles go."""
+        return min(law.rebuild for law, _, _ in self.laws)
+
     def reach(self, time: float) -> float:
         """The longest reach at a time [m]."""
         return max(law.reach(time) for law, _, _ in self.laws)
@@ -148,8 +153,8 @@ class Class:
         """Whether lists of particles miss no pair after these have moved [m], or last longer."""
         if not found.short or not math.isfinite(moved):
             return False
-        if every := min(law.rebuild for law, _, _ in self.laws):
-            return step - found.step < every
+        if self.every:
+            return step - found.step < self.every
         return 2 * moved <= (found.short_radius - self.reach(time)) * CAUTION
 
     def short_radius(self, found: Lists, moved: float, time: float) -> float:
@@ -158,7 +163,7 @@ class Class:
         No wider than what all pairs within it are listed for; 0 where it is not worth while.
         """
         reach = self.reach(time)
-        if any(law.rebuild for law, _, _ in self.laws) or not math.isfinite(moved):
+        if self.every or not math.isfinite(moved):
             return 0.0
         margin = SHORT * (found.radius - reach)
         room = (found.radius - 2 * moved) * CAUTION - reach

@@ -206,6 +206,8 @@ class Nearby:
             if shared.good(found, since, time, memory.steps):
                 return found, packed
             radius = shared.short_radius(found, moved, time)
+            if not found.short and (shared.every or not moved):
+                radius = radius or found.radius  # They were built for this very place or step.
         if not radius:
             self._build(k, bodies, memory, memory.steps)
             found = memory.lists[k]
