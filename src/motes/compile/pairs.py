@@ -24,7 +24,7 @@ from motes.control.constant import Constant, Setting
 from motes.errors import SceneError
 from motes.jit import jit
 from motes.kernel.language import can_fold
-from motes.machine.lanes import LANES, taken_apart
+from motes.machine.shuffles import LANES, taken_apart
 
 FORCE, POTENTIAL, VIRIAL = "force", "potential", "virial"
 """What a pair law's loops sum up besides what a gathering law's do, `near`."""
@@ -205,16 +205,18 @@ class Writer:
             place += width
         return self.text.record("P", expressions or {"nothing": "F(0.0)"})
 
-    def _particle(self, kind: str, names: tuple[str, ...], prefix: str) -> str:
+    def particle(self, kind: str, names: tuple[str, ...], prefix: str) -> str:
+        """An expression for a particle, from names of its numbers after a prefix."""
         return self.text.record(kind, {name: f"{prefix}{name}" for name in names})
 
     def call(self, name: str) -> str:
         """A call of a kernel of a pair."""
-        a, b = self._particle("A", self.own, "a_"), self._particle("B", self.other, "b_")
+        a, b = self.particle("A", self.own, "a_"), self.particle("B", self.other, "b_")
         fields = {"x": "rx", "y": "ry", "z": "rz", "square": "square", "length": "sqrt(square)"}
-        return f"{self._translated(name)}(p, {a}, {b}, {self.text.record('R', fields)})"
+        return f"{self.translated(name)}(p, {a}, {b}, {self.text.record('R', fields)})"
 
-    def _translated(self, name: str) -> str:
+    def translated(self, name: str) -> str:
+        """The name of one of the law's kernels in the text."""
         if name not in self._names:
             law = self.law
             function = law._kernel(name)
@@ -302,8 +304,8 @@ class Writer:
             lines += "        w = F(1.0) / a_mass\n"
             lines += "        fx, fy, fz = sums[0, i] * w, sums[1, i] * w, sums[2, i] * w\n"
         else:
-            a = self._particle("A", names, "a_")
-            lines += f"        fx, fy, fz = {self._translated('acceleration')}(p, {a}, {given})\n"
+            a = self.particle("A", names, "a_")
+            lines += f"        fx, fy, fz = {self.translated('acceleration')}(p, {a}, {given})\n"
         lines += "        row = order[i]\n"
         lines += "".join(f"        push[{k}, row] += f{axis}\n" for k, axis in enumerate(AXES))
         self.text.add(lines)

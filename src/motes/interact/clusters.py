@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from motes.interact.arrange import CLUSTER, FAR, Arranged
 from motes.interact.cells import Grid
 from motes.jit import STRICT, each, jit
-from motes.machine.lanes import LANES, near_slots, taken_apart
+from motes.machine.shuffles import LANES, near_slots, taken_apart
 from motes.memory import allocate
 
 
