@@ -216,3 +216,59 @@ def test_a_crowd_needs_kicks_and_drifts() -> None:
     people = walkers("people", (0, 0, 0), (5, 5, 0), (9, 0, 0), (1, 1, 0), burst=[{"count": 2}])
     with pytest.raises(motes.SceneError, match="semi_implicit_euler"):
         motes.Simulation(motes.Scene(systems=[people], interact=[motes.interact.Crowd()]))
+
+
+def test_parties_stay_together() -> None:
+    """Threes that walk at paces of their own, through others, stay within two steps; without the
+    law they lose each other. A party is three births after one another, wherever rows have gone."""
+
+    def spread(*laws: Any) -> tuple[float, float]:
+        emitter = motes.emit.Parties(burst=[{"count": 60}], size=(6, 12, 0), position=(-9, 0, 0))
+        forces = [
+            motes.force.Goal(place=(99, 0, 0), along=(1, 0, 0), speed={"mean": 1.2, "spread": 0.4}),
+            motes.force.Wander(strength=0.4, along=(1, 1, 0)),
+        ]
+        people = motes.System("people", emit=[emitter], force=forces, size=0.4)
+        sim = motes.Simulation(motes.Scene(
+            systems=[people], interact=[motes.interact.Crowd(), *laws], step=0.1, seed=3,
+            integrator="semi_implicit_euler", precision="double",
+        ))  # fmt: skip
+        sim.run(steps=1)
+        rows = sim._state.systems["people"]
+        stream, number = sim._steppers["people"].numbers(rows, rows.count, sim.time)
+        assert (stream == stream[0]).all()
+        assert (np.sort(number) == np.arange(1, 61)).all()
+        ids, party = sim["people"].id.copy(), (number - 1) // 3
+
+        def widest() -> float:
+            which = dict(zip(ids, party, strict=True))
+            now = np.array([which[i] for i in sim["people"].id])
+            x = sim["people"].position
+            return float(np.median([np.ptp(x[now == k], axis=0).max() for k in range(20)]))
+
+        first = widest()
+        sim.run(until=16.0)
+        return first, widest()
+
+    first, apart = spread()
+    same, together = spread(motes.interact.Party(members=3, strength=2.0, room=0.8))
+    assert first < 1.5
+    assert same < 1.5
+    assert apart > 5.0
+    assert together < 2.2
+
+
+def test_the_pull_of_a_party() -> None:
+    """Two, 4 m apart, with room 0.8 m: the whole strength; 2.4 m apart: half of it."""
+    for gap, share in ((4.0, 1.0), (2.4, 0.5), (1.6, 0.0)):
+        emitter = motes.emit.Parties(
+            burst=[{"count": 2}], members=2, size=(0, 0, 0), spacing=(gap, 0, 0), scatter=0.0
+        )
+        pair = motes.System("pair", emit=[emitter], force=[motes.force.Cruise(speed=0.0)])
+        sim = motes.Simulation(motes.Scene(
+            systems=[pair], interact=[motes.interact.Party(members=2, strength=3.0, room=0.8)],
+            step=0.01, integrator="semi_implicit_euler", precision="double",
+        ))  # fmt: skip
+        sim.run(steps=1)
+        x, v = sim["pair"].position[:, 0], sim["pair"].velocity[:, 0]
+        assert v * -np.sign(x) == pytest.approx(0.01 * 3.0 * share, abs=1e-9)
