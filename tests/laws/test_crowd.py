@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.plain import crowd
 
 import motes
 from motes.interact.crowd.avoid import Rules, Walls, avoid
@@ -64,6 +65,33 @@ def test_half_of_the_gap() -> None:
     assert (nx, ny, c) == pytest.approx((-1.0, 0.0, -2.0))
     assert 1.0 - 2 * -c * 0.1 == pytest.approx(0.6)
     assert contact(0.5, 0.0, 0.6, 0.1)[2] == 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_crowd_does_what_the_definition_says(seed: int) -> None:
+    """The kernels against all pairs and all candidates for the best, written down plainly."""
+    rng = np.random.default_rng(seed)
+    side = np.arange(4) * 1.6
+    x = np.stack(np.meshgrid(side, side)).reshape(2, -1) + rng.uniform(-0.5, 0.5, (2, 16))
+    v, wanted = rng.uniform(-1, 1, (2, 2, 16))
+    size, law = rng.uniform(0.15, 0.25, 16), rules(reach=4.0, margin=0.08, horizon=1.5)
+    found = avoid(x, v, wanted, size, no_walls(16), law, 15)
+    compared = 0
+    for i in range(16):
+        others = [j for j in range(16) if j != i and np.hypot(*(x[:, j] - x[:, i])) <= 4.0]
+        planes = []
+        for j in others:
+            p = x[:, j] - x[:, i]
+            n = -p / np.hypot(*p)
+            gap = np.hypot(*p) - size[i] - size[j]
+            planes.append((n, min(-0.5 * gap / law.step, 0.0)))  # At most half of the gap.
+            both = size[i] + size[j] + law.margin
+            planes.append(crowd.half_plane(p, v[:, i], v[:, j], both, law.horizon))
+        expected = crowd.best(planes, wanted[:, i], law.top_speed)
+        if expected is not None:
+            compared += 1
+            assert found[:, i] == pytest.approx(expected, abs=1e-6)
+    assert compared >= 12
 
 
 def test_a_thousand_on_a_circle_swap_places() -> None:
