@@ -193,24 +193,24 @@ def test_captures_are_deaths_and_are_told() -> None:
 
 
 def test_the_rate_of_captures() -> None:
-    """Two hundred mice near a cat that waits: in 0.3 s one is caught with the chance
+    """A hundred and twenty mice near a cat that waits: in 0.3 s one is caught with the chance
     1 - exp(-0.3 rate) a step-free law gives; the cat takes the nearest first, one a step."""
     alone = [
         motes.emit.Point(name=f"{who}{k}", burst=[{"count": 1}], position=(10 * k, 0.1 * far, 0))
         for who, far in (("cat", 0), ("mouse", 1))
-        for k in range(200)
+        for k in range(120)
     ]
     still = [motes.force.Cruise(speed=0.0)]
     law = motes.interact.Capture(hunters=["cats"], radius=0.25, rate=2.0)
     sim = motes.Simulation(motes.Scene(
-        systems=[motes.System("cats", emit=alone[:200], force=still),
-                 motes.System("mice", emit=alone[200:], force=still)],
+        systems=[motes.System("cats", emit=alone[:120], force=still),
+                 motes.System("mice", emit=alone[120:], force=still)],
         interact=[law], step=0.05, integrator="semi_implicit_euler", seed=1,
     ))  # fmt: skip
     for end in (0.3, 1.0):
         sim.run(until=end)
         share = 1 - np.exp(-2.0 * end)
-        assert abs(len(sim.captures) / 200 - share) < 3 * np.sqrt(share * (1 - share) / 200)
+        assert abs(len(sim.captures) / 120 - share) < 3 * np.sqrt(share * (1 - share) / 120)
 
 
 def lone(forces: list[Any], solid: Any = (), velocity: Any = (1, 0, 0), **settings: Any) -> Any:
@@ -432,7 +432,7 @@ def test_laws_mix_with_wind_terrain_and_solids() -> None:
         some = [force for name, force in forces.items() if name != left_out]
         sim = motes.Simulation(motes.Scene(
             systems=[motes.System("birds", emit=[emitter], force=some)], solid=[ball, ground],
-            interact=rules() if laws else [], precision="double", step=0.02,
+            interact=rules() if laws else [], precision="double", step=0.04,
             integrator="semi_implicit_euler", seed=3,
         ))  # fmt: skip
         sim.run(until=7.0)
