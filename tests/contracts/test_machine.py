@@ -377,6 +377,74 @@ def test_kernels_call_kernels():
     assert compiled(outer)(x, np.float32(0.5)) == expected(x, np.float32(0.5))
 
 
+TABLE = np.array([[0.5, -1.25], [3.0, 1e-300]])
+FLAGS = np.array([True, False])
+
+
+def test_arrays_of_a_module_are_part_of_the_code_and_only_read():
+    def looked_up(i, j):
+        return TABLE[i, j] * (2.0 if FLAGS[j] else 3.0), TABLE[1:].size
+
+    def overwritten(x):
+        TABLE[0, 0] = x
+
+    for place in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        same(looked_up, *place)
+    with pytest.raises(SceneError, match="only read"):
+        compiled(overwritten)(1.0)
+
+
+def test_a_function_may_return_an_array_of_its_own():
+    """Each call has one of its own, which lives as long as its caller's numbers."""
+
+    def shifted(x, h):
+        result = np.empty(3)
+        for i in range(3):
+            result[i] = x[i] + h
+        return result, h
+
+    def twice(x):
+        return shifted(shifted(x, 10.0)[0], 100.0)[0]
+
+    def outer(x, out):
+        a, b = twice(x), shifted(x, 1.0)[0]
+        for i in range(3):
+            out[0, i], out[1, i] = a[i], b[i]
+
+    same(outer, np.array([1.0, 2.0, 3.0]), np.zeros((2, 3)))
+
+    def looped(x):
+        for _ in range(3):
+            x = twice(x)
+        return x[0]
+
+    with pytest.raises(SceneError, match="inside a loop"):
+        compiled(looped)(np.zeros(3))
+
+
+def test_arrays_in_other_shapes():
+    def turned(x, n):
+        y, z = x.reshape((n, -1)), x.reshape(2, 3).ravel()
+        y[0, 1] += z[5]
+        return y[1, 0], y.shape[1], z.size
+
+    same(turned, np.arange(6.0), 3)
+    with pytest.raises(SceneError, match="follow each other"):
+        compiled(turned)(np.arange(12.0)[::2], 3)
+
+
+@pytest.mark.parametrize("x", [0.0, 0.3, 7.0, 1e200, math.inf])
+def test_powers_of_halves_and_of_any_number(x):
+    def powers(x, p):
+        return x**1.5, x**-0.5, x**0.5, x**2.5, x**p, math.exp(-x), math.sin(x % 1.0)
+
+    with np.errstate(all="ignore"):
+        x, p = np.float64(x), np.float64(0.7)
+        expected = x**1.5, x**-0.5, x**0.5, x**2.5, x**p, np.exp(-x), np.sin(x % 1.0)
+        expected = tuple(map(float, expected))
+    assert compiled(powers)(x, p) == pytest.approx(expected, rel=1e-15, nan_ok=True)
+
+
 # ---------------------------------------------------------------------------- faults, cache
 
 

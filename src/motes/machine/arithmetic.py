@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from motes.machine.block import Writer, common_type, literal, zero
@@ -150,12 +150,16 @@ class Arithmetic(Writer):
         return Scalar(kind, self.do(f"fsub {kind.llvm} {a.text}, {product}"))
 
     def power(self, a: Scalar, b: Scalar) -> Value:
-        """A power: products for small whole exponents."""
-        if b.literal is None or b.literal != int(b.literal) or abs(b.literal) > PRODUCTS:
-            raise Unsupported("a power needs a whole exponent; write pow of motes.kernel")
-        kind = a.type if a.type.kind == "f" else INT
-        result: Value | None = None
+        """A power: products and a root for small exponents that are multiples of a half."""
+        if b.literal is None or 2 * b.literal % 1 or abs(b.literal) > PRODUCTS:
+            if a.type.whole and b.type.whole:
+                raise Unsupported("a power of integers needs a small exponent that is known")
+            return self.formula("pow", [a, b])
+        kind = a.type if a.type.kind == "f" else DOUBLE if b.literal % 1 else INT
         square: Value = self.cast(a, kind)
+        result: Value | None = None
+        if b.literal % 1:
+            result = self.intrinsic("sqrt", self.cast(a, kind))
         rest = abs(int(b.literal))
         while rest:
             if rest & 1:
@@ -183,6 +187,10 @@ class Arithmetic(Writer):
 
     def declare(self, text: str) -> None:
         """Declare a function outside of the module."""
+        raise NotImplementedError
+
+    def formula(self, name: str, arguments: Sequence[Value]) -> Value:
+        """An elementary function, by the project's own formula for the arguments' precision."""
         raise NotImplementedError
 
     def negative(self, value: Scalar) -> Scalar:

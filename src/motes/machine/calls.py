@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import types
 from collections.abc import Callable, Sequence
@@ -30,21 +31,6 @@ ROOM = 1 << 14
 compiling, come from the heap."""
 
 
-def constant(thing: Any) -> Value:
-    """The value of a Python object that a function finds in its module or closure."""
-    if isinstance(thing, bool | np.bool_):
-        return literal(bool(thing), BOOL)
-    if isinstance(thing, np.generic):
-        return literal(thing.item(), of_dtype(thing.dtype))
-    if isinstance(thing, int):
-        return literal(thing, INT, bare=True)
-    if isinstance(thing, float):
-        return literal(thing, DOUBLE, bare=True)
-    if isinstance(thing, tuple):
-        return Group(tuple(constant(t) for t in thing), tuple(getattr(thing, "_fields", ())))
-    return Known(thing)
-
-
 def plain_function(thing: Any) -> types.FunctionType | None:
     """The Python function behind a kernel, a compiled function or a function; else None."""
     function = getattr(thing, "py_func", thing)
@@ -53,6 +39,38 @@ def plain_function(thing: Any) -> types.FunctionType | None:
 
 class Calls(Memory):
     """Calls by what is called."""
+
+    def constant(self, thing: Any) -> Value:
+        """The value of a Python object that a function finds in its module or closure."""
+        if isinstance(thing, bool | np.bool_):
+            return literal(bool(thing), BOOL)
+        if isinstance(thing, np.generic):
+            return literal(thing.item(), of_dtype(thing.dtype))
+        if isinstance(thing, int):
+            return literal(thing, INT, bare=True)
+        if isinstance(thing, float):
+            return literal(thing, DOUBLE, bare=True)
+        if isinstance(thing, tuple):
+            items = tuple(self.constant(t) for t in thing)
+            return Group(items, tuple(getattr(thing, "_fields", ())))
+        if isinstance(thing, np.ndarray):
+            return self._table(thing)
+        return Known(thing)
+
+    def _table(self, array: np.ndarray[Any, Any]) -> Value:
+        """An array as it is while compiling, part of the machine code; it is only read."""
+        item = of_dtype(array.dtype)
+        if array.size > ROOM:
+            raise Unsupported(f"an array of more than {ROOM} numbers; pass it as an argument")
+        whole = item.kind == "b"
+        numbers = [str(int(x)) if whole else literal(x, item).text for x in array.ravel().tolist()]
+        content = ", ".join(f"{item.stored} {number}" for number in numbers)
+        kind = f"[{array.size} x {item.stored}]"
+        name = f"@table_{hashlib.sha256(f'{kind}{content}'.encode()).hexdigest()[:24]}"
+        filled = f"[{content}]" if array.size else "zeroinitializer"
+        self.declare(f"{name} = internal global {kind} {filled}, align 64")
+        extents = tuple(map(str, array.shape))
+        return View(Array(item, array.ndim, True), name, extents)
 
     def call(self, thing: Any, arguments: Sequence[Value]) -> Value:
         """The value of a call of something known."""
@@ -68,8 +86,8 @@ class Calls(Memory):
             if len(arguments) != len(thing._fields):
                 raise Unsupported(f"{thing.__name__} takes {len(thing._fields)} values")
             return Group(tuple(arguments), thing._fields)
-        if isinstance(thing, np.ufunc) and thing in FORMULAS:
-            return self._formula(FORMULAS[thing], arguments)
+        if isinstance(thing, np.ufunc | types.BuiltinFunctionType) and thing in FORMULAS:
+            return self.formula(FORMULAS[thing], arguments)
         function = plain_function(thing)
         if function is None:
             raise Unsupported(f"{getattr(thing, '__name__', thing)!r} cannot be called in a kernel")
@@ -81,7 +99,7 @@ class Calls(Memory):
         """The value of a call of another kernel."""
         raise NotImplementedError
 
-    def _formula(self, name: str, arguments: Sequence[Value]) -> Value:
+    def formula(self, name: str, arguments: Sequence[Value]) -> Value:
         """An elementary function, by the project's own formula for the arguments' precision."""
         from motes.kernel import ELEMENTARY
 
@@ -217,6 +235,27 @@ class Calls(Memory):
             bytes = self.do(f"mul nsw i64 {bytes}, {text}")
         return View(packed, self.heap(bytes), texts)
 
+    def reshaped(self, array: View, extents: Sequence[Value]) -> View:
+        """`array.reshape`, `array.ravel()` of a packed array: the same numbers in another shape."""
+        if not array.type.packed:
+            raise Unsupported("only an array whose numbers follow each other can be reshaped")
+        if len(extents) == 1 and isinstance(extents[0], Group):
+            extents = extents[0].items
+        sizes = [self.cast(self._number(e), INT) for e in extents]
+        texts = [size.text for size in sizes]
+        for place, size in enumerate(sizes):
+            if size.literal == -1:
+                others = self.product([*texts[:place], *texts[place + 1 :]])
+                texts[place] = self.do(f"sdiv i64 {self.product(array.shape)}, {others}")
+        return View(Array(array.type.item, len(texts), True), array.address, tuple(texts))
+
+    def product(self, extents: Sequence[str]) -> str:
+        """Of integers in registers."""
+        result = "1"
+        for place, extent in enumerate(extents):
+            result = self.do(f"mul nsw i64 {result}, {extent}") if place else extent
+        return result
+
     def zeros(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
         """numpy.zeros."""
         array = self.empty(shape, kind)
@@ -278,5 +317,7 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
 FORMULAS = {
     np.exp: "exp", np.log: "log", np.sin: "sin", np.cos: "cos", np.tanh: "tanh",
     np.arctan2: "atan2", np.power: "pow",
+    math.exp: "exp", math.log: "log", math.sin: "sin", math.cos: "cos", math.tanh: "tanh",
+    math.atan2: "atan2", math.pow: "pow",
 }  # fmt: skip
-"""NumPy's functions that the project has formulas for."""
+"""NumPy's and Python's functions that the project has formulas for."""

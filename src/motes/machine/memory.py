@@ -57,6 +57,8 @@ class Memory(Arithmetic):
         """Write an element."""
         if len(places) != array.type.axes or not isinstance(value, Scalar):
             raise Unsupported("only numbers can be written into elements of arrays")
+        if array.address.startswith("@"):
+            raise Unsupported("an array of the module is only read")
         item = array.type.item
         number = self.cast(value, item)
         if number.type.lanes > 1:
@@ -176,6 +178,4 @@ class Memory(Arithmetic):
 
     def room(self, kind: Number, count: int) -> str:
         """Address of room for numbers on the stack."""
-        register = self.register()
-        self.head.lines.append(f"{register} = alloca [{count} x {kind.stored}], align 32")
-        return register
+        raise NotImplementedError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from motes.machine.block import Writer
 from motes.machine.calls import plain_function
@@ -23,23 +23,32 @@ FIELDS = {"data": _HEAD, "shape": _HEAD + 2 * _WORD, "strides": _HEAD + 3 * _WOR
 """Where NumPy's arrays (PyArrayObject_fields in its C interface) keep what a kernel needs."""
 
 
+class Made(NamedTuple):
+    """A function of a module."""
+
+    name: str
+    result: Type
+    lent: tuple[tuple[Number, int], ...]
+    """Room that its caller lends."""
+
+
 class Module:
     """Functions by what they are, with the types of their arguments."""
 
     def __init__(self) -> None:
         self.declarations: set[str] = set()
-        self._functions: dict[Any, tuple[str, Type] | None] = {}
+        self._functions: dict[Any, Made | None] = {}
         self._texts: list[str] = []
         self._memory: dict[Number, int] = {}
 
     def function(
         self, thing: Any, function: types.FunctionType, kinds: Sequence[Type], flags: Any
-    ) -> tuple[str, Type]:
-        """Name and type of the result of a function for arguments of given types.
+    ) -> Made:
+        """A function for arguments of given types: its name, its result, the room that it takes.
 
         `thing` is what is called: a kernel has flags of its own, a plain function those given.
         """
-        flags = getattr(thing, "flags", flags if isinstance(flags, frozenset) else None)
+        flags = getattr(thing, "flags", flags)
         flags = frozenset(flags.split()) if isinstance(flags, str) else flags
         key = (function, flags, tuple(kinds))
         if key in self._functions:
@@ -48,12 +57,12 @@ class Module:
                 raise Unsupported(f"{function.__name__} calls itself")
             return known
         self._functions[key] = None
-        writer = Function(self, function, kinds, flags)
         name = f"{function.__name__}.{len(self._functions)}"
+        writer = Function(self, function, kinds, flags)
         inline = "alwaysinline" if getattr(thing, "inline", True) else "noinline"
         self._texts.append(writer.text(name, f"{inline} {PLAIN}"))
-        self._functions[key] = name, writer.result
-        return name, writer.result
+        self._functions[key] = made = Made(name, writer.result, writer.lent)
+        return made
 
     def kind_of_memory(self, item: Number) -> str:
         """The mark of loads and stores of a type of number."""
@@ -145,5 +154,5 @@ def compiled_text(kernel: Any, kinds: Sequence[Type]) -> tuple[str, Type]:
     """LLVM's text of a kernel for argument types, and the type of its result."""
     module, function = Module(), plain_function(kernel)
     assert function is not None
-    name, result = module.function(kernel, function, kinds, frozenset())
+    name, result, _ = module.function(kernel, function, kinds, frozenset())
     return module.text(name, result, kinds), result

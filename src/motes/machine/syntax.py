@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from motes.machine.block import Edge, Names, literal
-from motes.machine.calls import Calls, constant
+from motes.machine.calls import Calls
 from motes.machine.kinds import BOOL, INT, Unsupported, of_dtype
 from motes.machine.source import Source
 from motes.machine.values import Group, Known, Scalar, Value, View, type_of
@@ -37,7 +37,7 @@ class Expressions(Calls):
         return found
 
     def _of_Constant(self, node: ast.Constant) -> Value:
-        return constant(node.value)
+        return self.constant(node.value)
 
     def _of_Name(self, node: ast.Name) -> Value:
         if node.id in self.names:
@@ -45,7 +45,7 @@ class Expressions(Calls):
         if node.id in self.source.local:
             raise Unsupported(f'"{node.id}" may be used before it has a value')
         if node.id in self.source.scope:
-            return constant(self.source.scope[node.id])
+            return self.constant(self.source.scope[node.id])
         if hasattr(builtins, node.id):
             return Known(getattr(builtins, node.id))
         raise Unsupported(f'name "{node.id}" is not known')
@@ -62,7 +62,7 @@ class Expressions(Calls):
         if isinstance(base, Known):
             if not hasattr(base.thing, node.attr):
                 raise Unsupported(f"{base.thing!r} has no {node.attr}")
-            return constant(getattr(base.thing, node.attr))
+            return self.constant(getattr(base.thing, node.attr))
         if isinstance(base, Group) and node.attr in base.names:
             return base.items[base.names.index(node.attr)]
         if isinstance(base, View) and node.attr in ("size", "shape", "ndim", "dtype"):
@@ -76,10 +76,7 @@ class Expressions(Calls):
             return literal(array.type.axes, INT, bare=True)
         if name == "dtype":
             return Known(np.dtype(array.type.item.name))
-        size = array.shape[0]
-        for extent in array.shape[1:]:
-            size = self.do(f"mul nsw i64 {size}, {extent}")
-        return Scalar(INT, size)
+        return Scalar(INT, self.product(array.shape))
 
     def _of_Subscript(self, node: ast.Subscript) -> Value:
         base, places = self.value(node.value), self._places(node.slice)
@@ -225,11 +222,14 @@ class Expressions(Calls):
     def _of_Call(self, node: ast.Call) -> Value:
         if node.keywords:
             raise Unsupported("arguments without keywords")
-        if isinstance(node.func, ast.Attribute) and node.func.attr == "view":
-            base = self.value(node.func.value)
-            if isinstance(base, Scalar):
+        if isinstance(node.func, ast.Attribute):
+            base, name = self.value(node.func.value), node.func.attr
+            if isinstance(base, Scalar) and name == "view":
                 kind = self._thing(node.args[0])
                 return self.bits_as(base, of_dtype(np.dtype(kind)))
+            if isinstance(base, View) and name in ("reshape", "ravel"):
+                extents = [self.value(a) for a in node.args] or [literal(-1, INT)]
+                return self.reshaped(base, extents)
         thing = self.value(node.func)
         if not isinstance(thing, Known):
             raise Unsupported("only functions are called")

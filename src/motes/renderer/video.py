@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.files import finished, written_whole
+from motes.renderer.picture import PNG_LEVEL
 
 Pixels = NDArray[np.uint8]
 
@@ -174,4 +175,4 @@ def contact_sheet(
         )
         draw.text((left + 2, top + tall + 5), f"t = {time:.2f} s", fill=(190, 190, 195), font=font)
     with written_whole(Path(path)) as file:
-        sheet.save(file, "PNG")
+        sheet.save(file, "PNG", compress_level=PNG_LEVEL)
