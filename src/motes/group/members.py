@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +26,8 @@ class Bodies:
     name: str
     position: NDArray[Any]
     mass: NDArray[Any]
+    births: Callable[[], NDArray[np.int64]] = lambda: np.zeros((2, 0), np.int64)
+    """Gives which births they are (2, n): number of the stream of births, and k from 1 on."""
 
 
 @dataclass(frozen=True)
