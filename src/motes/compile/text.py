@@ -108,6 +108,8 @@ class Text:
             "__name__": __name__,  # Cached machine code is rebuilt in an importable module.
             "F": self.real,
             "uint8": np.uint8,
+            "bits": np.int32 if self.precision == "single" else np.int64,
+            "SIGN": np.int32(31) if self.precision == "single" else np.int64(63),
             "empty": np.empty,
             "inline": lambda f: jit(f, flags=flags, inline=True),
             "kernel": lambda f: jit(f, flags=flags, numba=False),

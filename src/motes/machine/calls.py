@@ -15,13 +15,17 @@ from motes.machine.kinds import (
     BOOL,
     DOUBLE,
     INT,
+    INT32,
     NUMBERS,
+    UINT,
     Array,
     Number,
     Unsupported,
     of_dtype,
 )
+from motes.machine.lanes import bits, lowest, put, settled, take
 from motes.machine.memory import Memory
+from motes.machine.shuffles import SEEKING_NEEDS, near_slots, seeking, taken_apart, taking
 from motes.machine.values import Group, Known, Scalar, Value, View, type_of
 
 ROOM = 1 << 14
@@ -177,7 +181,7 @@ class Calls(Memory):
         """numpy.isnan."""
         number = self._real(value)
         test = f"fcmp uno {number.type.llvm} {number.text}, {number.text}"
-        return Scalar(BOOL, self.do(test))
+        return Scalar(BOOL.over(number.type.lanes), self.do(test))
 
     def length(self, value: Value) -> Value:
         """len."""
@@ -196,11 +200,27 @@ class Calls(Memory):
 
     def bits_as(self, value: Scalar, kind: Number) -> Scalar:
         """`value.view(type)`: the same bits as another type."""
+        kind = kind.over(value.type.lanes)
         if value.type.bits != kind.bits:
             raise Unsupported(f"{value.type} and {kind} differ in size")
         if value.type.llvm == kind.llvm:
             return Scalar(kind, value.text)
         return Scalar(kind, self.do(f"bitcast {value.type.llvm} {value.text} to {kind.llvm}"))
+
+    def bits(self, condition: Value) -> Value:
+        """`lanes.bits`."""
+        truth = self.truth(condition)
+        lanes = truth.type.lanes
+        whole = truth.text
+        if lanes > 1:
+            whole = self.do(f"bitcast {truth.type.llvm} {truth.text} to i{lanes}")
+        return Scalar(UINT, self.do(f"zext i{lanes} {whole} to i64"))
+
+    def lowest(self, number: Value) -> Value:
+        """`lanes.lowest`."""
+        self.declare("declare i64 @llvm.cttz.i64(i64, i1)")
+        whole = self.cast(self._number(number), UINT).text
+        return Scalar(UINT, self.do(f"call i64 @llvm.cttz.i64(i64 {whole}, i1 true)"))
 
     def empty(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
         """numpy.empty: room that the call has for itself; its numbers are not set."""
@@ -249,6 +269,48 @@ class Calls(Memory):
         """Address of memory that is given back when the function returns."""
         raise NotImplementedError
 
+    def written(self, name: str, text: str) -> None:
+        """See to it that the module holds a function whose text is known."""
+        raise NotImplementedError
+
+    def taken_apart(self, records: Value, slots: Value, *columns: Value) -> Value:
+        """`lanes.taken_apart`."""
+        views = self._packed(records, slots, *columns)
+        item = views[0].type.item
+        if views[0].type.axes != 2 or item.kind != "f" or views[1].type.item.bits != 32:
+            raise Unsupported("records of real numbers are taken apart, by numbers of 32 bits")
+        name = f"taken_apart.{item.llvm}"
+        self.written(name, taking(item.llvm))
+        x, y, z = (f"ptr {view.address}" for view in views[2:])
+        given = f"ptr {views[0].address}, ptr {views[1].address}, i64 {views[1].shape[0]}"
+        self.line(f"call void @{name}({given}, {x}, {y}, {z})")
+        return Known(None)
+
+    def near_slots(self, *given: Value) -> Value:
+        """`lanes.near_slots`."""
+        from motes.machine.target import moves_lanes
+
+        if not moves_lanes():
+            return self.call_function(near_slots, near_slots, given)
+        views = self._packed(*given[5:])
+        item = views[0].type.item
+        numbers = [self.cast(self._number(value), item).text for value in given[:4]]
+        me = self.cast(self._number(given[4]), INT32).text
+        for declaration in SEEKING_NEEDS:
+            self.declare(declaration)
+        name = f"near_slots.{item.llvm}"
+        self.written(name, seeking(item.llvm))
+        passed = [f"{item.llvm} {number}" for number in numbers]
+        passed += [f"i32 {me}", *(f"ptr {view.address}" for view in views[:4])]
+        passed += [f"i64 {views[3].shape[0]}", f"ptr {views[4].address}"]
+        return Scalar(INT, self.do(f"call i64 @{name}({', '.join(passed)})"))
+
+    def _packed(self, *values: Value) -> list[View]:
+        views = [value for value in values if isinstance(value, View) and value.type.packed]
+        if len(views) != len(values):
+            raise Unsupported("only packed arrays are taken here")
+        return views
+
 
 def _thing(value: Value) -> Any:
     if not isinstance(value, Known):
@@ -287,7 +349,14 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     np.round: _intrinsic("roundeven"),
     np.rint: _intrinsic("roundeven"),
     enumerate: Calls.numbered,
+    take: Calls.take,
+    put: Calls.put,
+    bits: Calls.bits,
+    lowest: Calls.lowest,
+    settled: _intrinsic("arithmetic.fence"),
     math.fabs: _intrinsic("fabs"),
+    taken_apart: Calls.taken_apart,
+    near_slots: Calls.near_slots,
 }
 """Handlers by the function itself."""
 

@@ -128,16 +128,16 @@ class Expressions(Calls):
         if isinstance(node.op, ast.Not):
             truth = self.truth(value)
             if truth.literal is not None:
-                return literal(not truth.literal, BOOL)
-            return Scalar(BOOL, self.do(f"xor i1 {truth.text}, true"))
+                return literal(not truth.literal, truth.type)
+            return self.binary("BitXor", truth, literal(True, BOOL))
         if not isinstance(value, Scalar):
             raise Unsupported("a sign belongs to a number")
         if isinstance(node.op, ast.USub):
             return self.negative(value)
         if isinstance(node.op, ast.Invert):
             kind = value.type
-            text = f"xor {kind.llvm} {value.text}, {'true' if kind.kind == 'b' else -1}"
-            return Scalar(kind, self.do(text))
+            ones = literal(True if kind.kind == "b" else -1, kind).text
+            return Scalar(kind, self.do(f"xor {kind.llvm} {value.text}, {ones}"))
         return value
 
     def _of_Compare(self, node: ast.Compare) -> Value:
@@ -151,7 +151,7 @@ class Expressions(Calls):
     def _both(self, a: Scalar, b: Scalar) -> Scalar:
         if a.literal is not None:
             return b if a.literal else a
-        return Scalar(BOOL, self.do(f"and i1 {a.text}, {b.text}"))
+        return self.truth(self.binary("BitAnd", a, b))
 
     def _compared(self, op: ast.cmpop, left: Value, right: Value) -> Scalar:
         if isinstance(op, ast.Is | ast.IsNot):
@@ -163,9 +163,9 @@ class Expressions(Calls):
             for item in right.items:
                 test = self._compared(ast.Eq(), left, item)
                 found = self.truth(self.binary("BitOr", found, test))
-            return found if isinstance(op, ast.In) else Scalar(
-                BOOL, self.do(f"xor i1 {found.text}, true")
-            )  # fmt: skip
+            if isinstance(op, ast.In):
+                return found
+            return self.truth(self.binary("BitXor", found, literal(True, BOOL)))
         if isinstance(left, Known) and isinstance(right, Known):
             return literal((left.thing == right.thing) == isinstance(op, ast.Eq), BOOL)
         if not isinstance(left, Scalar) or not isinstance(right, Scalar):
@@ -183,10 +183,9 @@ class Expressions(Calls):
                     break
                 result = self.condition(part)
                 continue
-            if self.source.cheap(part):
-                step = "or" if ends else "and"
-                other = self.condition(part)
-                result = Scalar(BOOL, self.do(f"{step} i1 {result.text}, {other.text}"))
+            if self.source.cheap(part) or result.type.lanes > 1:
+                step = "BitOr" if ends else "BitAnd"
+                result = self.truth(self.binary(step, result, self.condition(part)))
                 continue
             yes, no = self.fork(result.text)
             leave, self.block = (yes, no) if ends else (no, yes)
@@ -202,7 +201,8 @@ class Expressions(Calls):
         condition = self.condition(node.test)
         if condition.literal is not None:
             return self.value(node.body if condition.literal else node.orelse)
-        if self.source.cheap(node.body) and self.source.cheap(node.orelse):
+        cheap = self.source.cheap(node.body) and self.source.cheap(node.orelse)
+        if cheap or condition.type.lanes > 1:
             yes, no = self.value(node.body), self.value(node.orelse)
             picked = self.chosen(condition, yes, no)
             if picked is None:
