@@ -47,12 +47,14 @@ _use_full_vectors()
 def dispatcher(function: Callable[..., Any], flags: frozenset[str], inline: bool) -> Any:
     """A function as Numba compiles it, with our flags and our kernel cache."""
     extra = {"pipeline_class": InlineCompiler} if inline else {}
+    # Kernels of interactions make no arrays, so that nothing needs to count references.
+    counts = not str(function.__module__).startswith("motes.interact.")
     compiled = numba.njit(
         nogil=True,
         fastmath=set(flags) if flags else False,
         error_model="numpy",
         forceinline=inline,
-        _nrt=False,
+        _nrt=counts,
         no_cfunc_wrapper=True,
         no_cpython_wrapper=inline,
         **extra,

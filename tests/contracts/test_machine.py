@@ -422,6 +422,14 @@ def test_a_function_may_return_an_array_of_its_own():
         compiled(looped)(np.zeros(3))
 
 
+def test_a_lambda_is_a_function_and_two_in_a_line_are_not():
+    square = lambda x, h: x * x + h  # noqa: E731
+    same(square, 1.5, 0.25)
+    twins = [lambda x: x, lambda x: 2 * x]
+    with pytest.raises(SceneError, match="cannot be read"):
+        compiled(twins[1])(1.0)
+
+
 def test_arrays_in_other_shapes():
     def turned(x, n):
         y, z = x.reshape((n, -1)), x.reshape(2, 3).ravel()

@@ -63,7 +63,7 @@ class Module:
                 raise Unsupported(f"{function.__name__} calls itself")
             return known
         self._functions[key] = None
-        name = f"{function.__name__}.{len(self._functions)}"
+        name = f"{function.__name__.strip('<>')}.{len(self._functions)}"
         writer = Function(self, function, kinds, flags)
         inline = "alwaysinline" if getattr(thing, "inline", True) else "noinline"
         self._texts.append(writer.text(name, f"{inline} {PLAIN}"))

@@ -25,12 +25,20 @@ FEW = 24
 
 @lru_cache(maxsize=64)
 def _definitions(text: str) -> dict[tuple[str, int], ast.FunctionDef]:
-    """All functions of a file by name and first line, decorators included."""
-    found = {}
+    """All functions of a file by name and first line, decorators and lambdas included."""
+    found: dict[tuple[str, int], ast.FunctionDef] = {}
+    lambdas: dict[int, list[ast.Lambda]] = {}
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef):
             lines = [node.lineno, *(d.lineno for d in node.decorator_list)]
             found[node.name, min(lines)] = node
+        elif isinstance(node, ast.Lambda):
+            lambdas.setdefault(node.lineno, []).append(node)
+    for line, nodes in lambdas.items():
+        if len(nodes) == 1:  # Of several in one line, none can be told from the others.
+            whole = ast.FunctionDef("lambda_", nodes[0].args, [ast.Return(nodes[0].body)], [])
+            ast.copy_location(whole.body[0], nodes[0].body)
+            found["<lambda>", line] = ast.copy_location(whole, nodes[0])
     return found
 
 
