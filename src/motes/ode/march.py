@@ -180,7 +180,7 @@ def steps(pieces: Pieces, room: Room, watch: Kernel, cross: Kernel, wrap: Wrap) 
             and counts[MESH] < mesh_t.size
             and counts[FOUND] + PARTS * events <= record.found_t.size
         ):
-            t = clock[TIME]
+            t = float(clock[TIME])
             if counts[STEPS] + counts[REJECTED] >= control.limit:
                 counts[STATUS] = TOO_MANY
                 break
@@ -191,7 +191,7 @@ def steps(pieces: Pieces, room: Room, watch: Kernel, cross: Kernel, wrap: Wrap) 
                     after = control.stop
                 h = after - t
             else:
-                h = sign * min(abs(clock[STEP]), control.largest)
+                h = sign * min(abs(float(clock[STEP])), control.largest)
                 after = t + h
                 if sign * (t + 1.01 * h - control.stop) >= 0.0:
                     after = control.stop
