@@ -15,6 +15,7 @@ from motes.machine.kinds import (
     BOOL,
     DOUBLE,
     INT,
+    INT32,
     NUMBERS,
     UINT,
     Array,
@@ -24,6 +25,7 @@ from motes.machine.kinds import (
 )
 from motes.machine.lanes import bits, lowest, put, settled, take
 from motes.machine.memory import Memory
+from motes.machine.shuffles import SEEKING_NEEDS, near_slots, seeking, taken_apart, taking
 from motes.machine.values import Group, Known, Scalar, Value, View, type_of
 
 ROOM = 1 << 14
@@ -267,6 +269,48 @@ class Calls(Memory):
         """Address of memory that is given back when the function returns."""
         raise NotImplementedError
 
+    def written(self, name: str, text: str) -> None:
+        """See to it that the module holds a function whose text is known."""
+        raise NotImplementedError
+
+    def taken_apart(self, records: Value, slots: Value, *columns: Value) -> Value:
+        """`lanes.taken_apart`."""
+        views = self._packed(records, slots, *columns)
+        item = views[0].type.item
+        if views[0].type.axes != 2 or item.kind != "f" or views[1].type.item.bits != 32:
+            raise Unsupported("records of real numbers are taken apart, by numbers of 32 bits")
+        name = f"taken_apart.{item.llvm}"
+        self.written(name, taking(item.llvm))
+        x, y, z = (f"ptr {view.address}" for view in views[2:])
+        given = f"ptr {views[0].address}, ptr {views[1].address}, i64 {views[1].shape[0]}"
+        self.line(f"call void @{name}({given}, {x}, {y}, {z})")
+        return Known(None)
+
+    def near_slots(self, *given: Value) -> Value:
+        """`lanes.near_slots`."""
+        from motes.machine.target import moves_lanes
+
+        if not moves_lanes():
+            return self.call_function(near_slots, near_slots, given)
+        views = self._packed(*given[5:])
+        item = views[0].type.item
+        numbers = [self.cast(self._number(value), item).text for value in given[:4]]
+        me = self.cast(self._number(given[4]), INT32).text
+        for declaration in SEEKING_NEEDS:
+            self.declare(declaration)
+        name = f"near_slots.{item.llvm}"
+        self.written(name, seeking(item.llvm))
+        passed = [f"{item.llvm} {number}" for number in numbers]
+        passed += [f"i32 {me}", *(f"ptr {view.address}" for view in views[:4])]
+        passed += [f"i64 {views[3].shape[0]}", f"ptr {views[4].address}"]
+        return Scalar(INT, self.do(f"call i64 @{name}({', '.join(passed)})"))
+
+    def _packed(self, *values: Value) -> list[View]:
+        views = [value for value in values if isinstance(value, View) and value.type.packed]
+        if len(views) != len(values):
+            raise Unsupported("only packed arrays are taken here")
+        return views
+
 
 def _thing(value: Value) -> Any:
     if not isinstance(value, Known):
@@ -311,6 +355,8 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     lowest: Calls.lowest,
     settled: _intrinsic("arithmetic.fence"),
     math.fabs: _intrinsic("fabs"),
+    taken_apart: Calls.taken_apart,
+    near_slots: Calls.near_slots,
 }
 """Handlers by the function itself."""
 

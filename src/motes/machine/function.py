@@ -114,6 +114,10 @@ class Function(Loops):
         """Declare a function outside of the module."""
         self.module.declarations.add(text)
 
+    def written(self, name: str, text: str) -> None:
+        """See to it that the module holds a function whose text is known."""
+        self.module.known.setdefault(name, text)
+
     def kind_of_memory(self, item: Number) -> str:
         """The mark of an array's type."""
         return self.module.kind_of_memory(item)

@@ -15,6 +15,10 @@ from motes.machine.values import Scalar, register_types
 ENTRY = "motes_entry"
 """Name of the function that Python calls: it reads arguments of 8 bytes each from memory."""
 
+EACH = "motes_each"
+"""Name of the function that runs the first for many packs of arguments, whose number threads take
+from a common counter."""
+
 PLAIN = "nounwind mustprogress"
 
 _WORD = 8
@@ -37,6 +41,8 @@ class Module:
 
     def __init__(self) -> None:
         self.declarations: set[str] = set()
+        self.known: dict[str, str] = {}
+        """Functions whose text does not follow from Python's, by name."""
         self._functions: dict[Any, Made | None] = {}
         self._texts: list[str] = []
         self._memory: dict[Number, int] = {}
@@ -76,7 +82,8 @@ class Module:
             first = 2 * number + 1
             tables.append(f'!{first} = !{{!"{item.name}", !0, i64 0}}')
             tables.append(f"!{first + 1} = !{{!{first}, !{first}, i64 0}}")
-        parts = [*sorted(self.declarations), *self._texts, door(name, result, kinds), *tables]
+        written = [*self.known.values(), *self._texts]
+        parts = [*sorted(self.declarations), *written, door(name, result, kinds), *tables]
         return "\n".join(parts)
 
 
@@ -138,8 +145,26 @@ def door(name: str, result: Type, kinds: Sequence[Type]) -> str:
         at = writer.do(f"getelementptr inbounds i64, ptr %to, i64 {k}")
         writer.line(f"store {number.type.llvm} {number.text}, ptr {at}")
     body = "\n".join(writer.blocks[0].lines)
-    return (
+    entry = (
         f"define void @{ENTRY}(ptr noalias %from, ptr noalias %to) {PLAIN} {{\n{body}\nret void\n}}"
+    )
+    return entry if out else f"{entry}\n{each()}"
+
+
+def each() -> str:
+    """The door's loop: packs of `stride` bytes until `most` are done or all `count` are taken."""
+    return (
+        f"define void @{EACH}(ptr %from, i64 %stride, ptr %next, i64 %count, i64 %most) "
+        f"nounwind {{\nhead:\n  br label %top\ntop:\n"
+        "  %done = phi i64 [ 0, %head ], [ %more, %body ]\n"
+        "  %enough = icmp sge i64 %done, %most\n"
+        "  br i1 %enough, label %end, label %take\ntake:\n"
+        "  %k = atomicrmw add ptr %next, i64 1 seq_cst\n"
+        "  %over = icmp sge i64 %k, %count\n  br i1 %over, label %end, label %body\nbody:\n"
+        "  %offset = mul i64 %k, %stride\n"
+        "  %pack = getelementptr inbounds i8, ptr %from, i64 %offset\n"
+        f"  call void @{ENTRY}(ptr %pack, ptr null)\n"
+        "  %more = add i64 %done, 1\n  br label %top\nend:\n  ret void\n}"
     )
 
 
