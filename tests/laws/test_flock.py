@@ -31,8 +31,9 @@ def rules() -> list[Any]:
 def flock(n: int = 300, **settings: Any) -> motes.Simulation:
     """A cloud of boids of about twenty neighbours, without a step taken."""
     emitter = motes.emit.Box(
-        burst=[{"count": n}], size=(6, 6, 6), velocity={"low": [-1, -1, -1], "high": [2, 1, 1]}
-    )
+        burst=[{"count": n}], size=(settings.pop("size", 6.0),) * 3,
+        velocity={"low": [-1, -1, -1], "high": [2, 1, 1]},
+    )  # fmt: skip
     known = {"precision": "double", "integrator": "semi_implicit_euler", "step": 0.02, "seed": 4}
     system = motes.System("boids", emit=[emitter], force=settings.pop("force", []))
     return motes.Simulation(
@@ -50,13 +51,15 @@ def born(sim: motes.Simulation) -> tuple[np.ndarray, np.ndarray]:
     return view.position[order] - bare.step * v, v
 
 
-@pytest.mark.parametrize("box", [None, 6.5])
+@pytest.mark.parametrize("box", [None, 6.5, 10.2])
 def test_a_step_is_that_of_all_pairs(box: float | None) -> None:
-    """v' = v + h a with a from the double loop over all pairs, also across periodic borders."""
+    """v' = v + h a with a from the double loop over all pairs, also across periodic borders: by
+    lists where the period holds less than five reaches, else by cells."""
     periodic = {} if box is None else {
         "periodic": motes.Periodic(low=(-box / 2,) * 3, size=(box,) * 3)
     }  # fmt: skip
-    sim = flock(**periodic)
+    sim = flock(400 if box == 10.2 else 300, size=10.1 if box == 10.2 else 6.0, **periodic)
+    assert (sim._groups[0].nearby.swarm is None) == (box == 6.5)
     x, v = born(sim)
     sim.run(steps=1)
     view, order = sim["boids"], np.argsort(sim["boids"].id)
@@ -190,6 +193,21 @@ def test_captures_are_deaths_and_are_told() -> None:
     before = len(sim.captures)
     sim.frame(8.0)
     assert len(sim.captures) == before  # A look ahead catches nobody.
+
+
+def test_the_radius_of_captures() -> None:
+    """Who is 0.2499 m away is caught, who is 0.2501 m away is not; of two near the nearer one."""
+    places = {"in": 0.2499, "out": 10.2501, "near": 20.1, "next": 20.2}
+    mice = [motes.emit.Point(name=n, burst=[{"count": 1}], position=(x, 0, 0))
+            for n, x in places.items()]  # fmt: skip
+    cats = [motes.emit.Point(name=f"c{k}", burst=[{"count": 1}], position=(10 * k, 0, 0))
+            for k in range(3)]  # fmt: skip
+    sim = motes.Simulation(motes.Scene(
+        systems=[motes.System("mice", emit=mice), motes.System("cats", emit=cats)],
+        interact=[motes.interact.Capture(hunters=["cats"], radius=0.25)], precision="double",
+    ))  # fmt: skip
+    sim.run(steps=1)
+    assert np.sort(sim.captures["place"][:, 0]) == pytest.approx([0.2499, 20.1])
 
 
 def test_the_rate_of_captures() -> None:

@@ -40,13 +40,15 @@ class Gathering:
     """Several laws' sums over the same sources: a kernel and the numbers that it reads."""
 
     def __init__(self, laws: Sequence[Law]) -> None:
-        self.laws = list(laws)
-        self.own, self.other = _read(laws, 0), _read(laws, 1)
+        # Few sums first: with that order of the three rules of flocks the loop is 58 instructions
+        # long, with others 76 to 78, since LLVM moves sums from register to register.
+        self.laws = sorted(laws, key=lambda law: law.sums())
+        self.own, self.other = _read(self.laws, 0), _read(self.laws, 1)
         self.sums = sum(law.sums() for law in laws)
         self._places: dict[Any, int] = {}
         """Where each number is. What never changes and is the same in two laws is one number, and
         what follows from it is computed once."""
-        self._of_laws = [self._places_of(law) for law in laws]
+        self._of_laws = [self._places_of(law) for law in self.laws]
         self._kernel: Callable[..., Any] | None = None
         self._first = threading.Lock()
 
