@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from motes.group.contacts import Planes
 from motes.group.lasting import Body
 from motes.interact.arrange import Box
 from motes.jit import blocks, each
@@ -52,6 +54,8 @@ class Occasion:
     address: str
     seed: int
     periodic: Box
+    planes: Callable[[NDArray[Any], float], Planes]
+    """Solids that collide within a reach [m] of positions (3, n) [m], as planes."""
 
 
 @dataclass
