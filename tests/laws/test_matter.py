@@ -288,14 +288,14 @@ def test_a_pile_of_hard_spheres_comes_to_rest() -> None:
         integrator="semi_implicit_euler",
     )  # fmt: skip
     sim = motes.Simulation(scene)
-    grid = np.stack(np.meshgrid(*[np.arange(4)] * 2, np.arange(6)), -1).reshape(-1, 3)
+    grid = np.stack(np.meshgrid(*[np.arange(4)] * 2, np.arange(14)), -1).reshape(-1, 3)
     jitter = np.random.default_rng(3).random(grid.shape) * 0.02
     sim.place("grains", (grid - [1.5, 1.5, -1]) * 0.12 * [0.8, 0.8, 1] + jitter)
     sim.run(until=3.0)
     speeds = (sim["grains"].velocity ** 2).sum(axis=1)
-    assert 0.5 * speeds.mean() < 6 * 0.5 * (9.81 * 0.004) ** 2
+    assert 0.5 * speeds.mean() < 4 * 0.5 * (9.81 * 0.004) ** 2
     assert sim["grains"].position[:, 2].min() > 0.05 - 1e-3
-    assert sim["grains"].position[:, 2].max() > 0.3
+    assert sim["grains"].position[:, 2].max() > 0.8
 
 
 def test_energy_and_pressure_are_those_of_thermo() -> None:
@@ -321,7 +321,7 @@ def test_local_order_knows_periodic_space() -> None:
     shaken = x + np.random.default_rng(1).normal(size=x.shape) * 0.35
     order = motes.matter.local_order(shaken, size)
     assert np.median(order) < 0.25
-    moved = (shaken + [1.3, 2.9, 0.4]) % np.array(size)
+    moved = (shaken + np.array([1.3, 2.9, 0.4])) % np.array(size)
     assert motes.matter.local_order(moved, size) == pytest.approx(order, abs=1e-9)
 
 
