@@ -52,6 +52,7 @@ def dispatcher(function: Callable[..., Any], flags: frozenset[str], inline: bool
         fastmath=set(flags) if flags else False,
         error_model="numpy",
         forceinline=inline,
+        _nrt=False,
         no_cfunc_wrapper=True,
         no_cpython_wrapper=inline,
         **extra,

@@ -95,6 +95,15 @@ class Stepper:
             "life or speed."
         )
 
+    def numbers(self, rows: Particles, alive: int, time: float) -> NDArray[np.int64]:
+        """Which births the rows that were alive are (2, alive): number of the stream, and k."""
+        found: NDArray[np.int64] = np.full((2, alive), -1)
+        for e, clock in enumerate(self.clocks):
+            stream, number = clock.numbers(rows.ids[:alive], time)
+            own = stream >= 0
+            found[0, own], found[1, own] = stream[own] * len(self.clocks) + e, number[own]
+        return found
+
     def births(self, rows: Particles, interval: Interval) -> int:
         """Append the newborns of the step, as they are at their own instants.
 

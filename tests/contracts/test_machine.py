@@ -19,6 +19,8 @@ from hypothesis import strategies as st
 import motes.jit
 from motes.errors import SceneError
 from motes.jit import STRICT, Kernel, jit
+from motes.machine.lanes import bits as marks_of
+from motes.machine.lanes import lowest, put, settled, take
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning"),
@@ -533,3 +535,65 @@ def test_vectors_change_lanes_as_plain_python_says(real):
     assert found == near(x, limit, slots, places[1])
     assert 3 < found < 64
     assert (places[0][:found] == places[1][:found]).all()
+
+
+# ---------------------------------------------------------------------------- lanes
+
+
+def test_lanes_are_numbers_side_by_side() -> None:
+    """A function of single numbers works on eight at once: arithmetic, choices, ways, bits."""
+
+    def law(x: Any, y: Any) -> Any:
+        far = np.sqrt(x * x + y * y)
+        w = 1.0 - far if far < 1.0 else -0.5 * y
+        if (x > y) & (far >= 0.25) and not far > 3.0:
+            w = abs(w) + max(x, 0.25)
+            y = -y
+        else:
+            w = min(w, x / (far + 1.0))
+        return w + y, far > 1.0
+
+    inner = jit(law, flags=STRICT, inline=True)
+
+    def eight(x: Any, y: Any, out: Any, marks: Any) -> None:
+        for i in range(0, x.size, 8):
+            value, far = inner(take(x, i, 8), y[i])
+            put(out, i, settled(value) + 1)
+            whole = marks_of(far)
+            while whole != np.uint64(0):
+                marks[np.uint64(i) + lowest(whole)] = 1
+                whole &= whole - np.uint64(1)
+
+    def one(x: Any, y: Any, out: Any, marks: Any) -> None:
+        for i in range(x.size):
+            value, far = law(take(x, i, 1), y[i // 8 * 8])
+            put(out, i, settled(value) + x.dtype.type(1))
+            marks[i + int(lowest(1))] = marks_of(far)
+
+    rng = np.random.default_rng(1)
+    for real in (np.float32, np.float64):
+        x, y = rng.normal(size=(2, 64)).astype(real) * real(2)
+        found, expected = np.zeros((2, 64), real)
+        marks, told = np.zeros((2, 64), np.int32)
+        compiled(eight)(x, y, found, marks)
+        one(x, y, expected, told)
+        np.testing.assert_array_equal(found, expected)
+        np.testing.assert_array_equal(marks, told)
+
+
+def test_lanes_go_the_same_way() -> None:
+    """A loop that would end for some lanes only, and a write for some, are refused."""
+
+    def ends(x: Any) -> None:
+        a = take(x, 0, 8)
+        while a > 0:
+            a = a - 1
+        put(x, 0, a)
+
+    def writes(x: Any) -> None:
+        if take(x, 0, 8) > 0:
+            x[0] = 1.0
+
+    for function in (ends, writes):
+        with pytest.raises(SceneError, match="lanes"):
+            compiled(function)(np.ones(8))

@@ -9,7 +9,7 @@ from test_gravity import plummer_sphere
 from motes import gravity
 from motes.interact.gravity.expansions import folded, terms
 from motes.interact.gravity.multipole import Plan, Problem
-from motes.interact.gravity.tree import SKIP, Box, octree, summarize
+from motes.interact.gravity.tree import NUMBER, Box, octree, summarize
 
 
 def distributions(n):
@@ -103,7 +103,9 @@ def test_single_precision_input_keeps_its_tolerance():
     assert relative(a, exact) < 1e-6
 
 
-@pytest.mark.parametrize(("law", "orders"), [("newton", (2, 3, 5, 9)), ("plummer", (2, 3, 4, 6))])
+@pytest.mark.parametrize(
+    ("law", "orders"), [("newton", (2, 3, 5, 9, 12)), ("plummer", (2, 3, 4, 6))]
+)
 def test_the_error_falls_with_the_order(law, orders):
     """At a fixed opening of 1/2 each order divides the error by more than 1.5."""
     x, m = plummer_sphere(3000)
@@ -116,7 +118,7 @@ def test_the_error_falls_with_the_order(law, orders):
         sums = problem.unsorted(problem.solve(problem.limits(np.inf, np.inf, np.inf)))
         errors.append(relative(sums[:3].T, exact))
     assert np.all(np.diff(np.log(errors)) < -np.log(1.5) * np.diff(orders))
-    assert errors[-1] < (3e-6 if law == "newton" else 1e-4)
+    assert errors[-1] < (1e-6 if law == "newton" else 1e-4)
 
 
 @pytest.mark.parametrize("harmonic", [True, False])
@@ -125,7 +127,7 @@ def test_moments_of_every_cell_are_the_sums_over_its_particles(harmonic):
     x, m = plummer_sphere(500)
     kind = terms(6, harmonic)
     tree = summarize(octree(x, m, box(x), 20), 6, harmonic, np.float64, True)
-    for cell, (start, end, _) in enumerate(tree.cells):
+    for cell, (start, end) in enumerate(tree.cells[:, :2]):
         center, radius = tree.bodies[cell, :3], tree.bodies[cell, 3]
         inside, mass = tree.place[:3, start:end].T, tree.place[3, start:end]
         np.testing.assert_allclose(center, np.average(inside, axis=0, weights=mass))
@@ -146,7 +148,8 @@ def test_a_tree_holds_every_particle_once():
     tree = octree(x, m, box(x), 30)
     assert np.array_equal(np.sort(tree.order), np.arange(5000))
     assert np.array_equal(tree.place[:3], (x - x.min(axis=0))[tree.order].T)
-    leaves = tree.cells[tree.cells[:, SKIP] == np.arange(1, len(tree.cells) + 1)]
+    leaves = tree.cells[tree.cells[:, NUMBER] == 0]
+    leaves = leaves[np.argsort(leaves[:, 0])]
     assert leaves[0, 0] == 0
     assert leaves[-1, 1] == 5000
     assert np.array_equal(leaves[1:, 0], leaves[:-1, 1])

@@ -27,6 +27,8 @@ class Bodies:
     name: str
     position: NDArray[Any]
     mass: NDArray[Any]
+    births: Callable[[], NDArray[np.int64]] = lambda: np.zeros((2, 0), np.int64)
+    """Gives which births they are (2, n): number of the stream of births, and k from 1 on."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from motes.interact.gravity.translations import Translations, padded
 SOURCES = 1536
 """Sources that are packed for one sum over pairs: in single precision they fit the first cache."""
 
-_STACK = 8 * (LEVELS + 2) + LANES
+_STACK = 8 * LANES * (LEVELS + 2) + LANES
 
 
 class Limits(NamedTuple):
@@ -44,7 +44,13 @@ class Desk(NamedTuple):
     place: NDArray[Any]
     """(5, lanes) what `Translations` take: coordinates, a factor, and a radius."""
     chosen: NDArray[np.int32]
-    """(lanes,) the source cells at these places."""
+    """(lanes,) source cells that are tested together."""
+    ascending: NDArray[np.int32]
+    """(lanes,) 0, 1, 2 ..."""
+    verdict: NDArray[Any]
+    """(1, lanes) what the test says."""
+    far: NDArray[np.int32]
+    """(3 lanes,) source cells whose expansions are to be used."""
     candidates: NDArray[np.int32]
     """Source cells that are left for a target cell's children, lists of all levels end to end."""
     waiting: NDArray[np.int32]
@@ -75,9 +81,12 @@ def desk(operations: Translations, real: type, largest: int, capacity: int) -> D
     return Desk(
         place=np.ones((5, LANES), real),
         chosen=np.zeros(LANES, np.int32),
+        ascending=np.arange(LANES, dtype=np.int32),
+        verdict=np.zeros((1, LANES), real),
+        far=np.zeros(3 * LANES, np.int32),
         candidates=np.empty(capacity, np.int32),
         waiting=np.empty((_STACK, 3), np.int32),
-        opened=np.empty(_STACK, np.int32),
+        opened=np.zeros(_STACK, np.int32),
         local=np.zeros((_STACK, padded(operations.basis)), real),
         gathered=np.empty((operations.basis, LANES), real),
         target=np.zeros((3, width), real),

@@ -57,7 +57,8 @@ def _define(sign: Any, name: str) -> None:
 
     @lower_builtin(sign, Lanes, Lanes)
     def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return getattr(builder, name)(*args)
+        whole = isinstance(sig.return_type.element, types.Integer)
+        return getattr(builder, name[1:] if whole else name)(*args)
 
 
 _define(operator.add, "fadd")
@@ -86,6 +87,17 @@ def shuffle(builder: Any, a: Any, b: Any, places: list[int]) -> Any:
     return builder.shuffle_vector(
         a, b, ir.Constant(ir.VectorType(ir.IntType(32), len(places)), places)
     )
+
+
+def joined(builder: Any, parts: list[Any]) -> Any:
+    """Vectors end to end."""
+    while len(parts) > 1:
+        width = parts[0].type.count
+        parts = [
+            shuffle(builder, a, b, list(range(2 * width)))
+            for a, b in zip(parts[::2], parts[1::2], strict=True)
+        ]
+    return parts[0]
 
 
 def added(builder: Any, vector: Any) -> Any:

@@ -18,8 +18,8 @@ from motes.interact.gravity.desk import Desk, Limits, desk
 from motes.interact.gravity.translations import translations
 from motes.interact.gravity.tree import (
     END,
+    NUMBER,
     RADIUS,
-    SKIP,
     START,
     Box,
     Tree,
@@ -48,14 +48,20 @@ GROWTH = 3.0
 """First trial of what one expansion may neglect: this to the power of order - 2, times the
 tolerance, as errors of many expansions cancel and the estimate is an upper bound."""
 
+ENOUGH = 5.0
+"""How much less it must neglect at least, or it is made again."""
+
 TRIALS = 8
 """Trials before all is summed by pairs."""
+
+TASKS = 128
+"""Parts of the walk; each of the threads takes one after the other."""
 
 STRICTER = 20.0
 """How much less the walk that the sample is compared with may neglect."""
 
-HIGHEST = {True: 9, False: 6}
-"""Highest order of harmonic expansions and of others: code for more is slow to make and run."""
+HIGHEST = {True: 12, False: 8}
+"""Highest order of harmonic expansions and of others: more would not be faster."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +168,7 @@ class Problem:
         for _ in range(TRIALS):
             # A sun's momentum hangs on single expansions, whose errors do not cancel.
             limits = self.limits(share * scale, min(share, 8 * tolerance) * force, rounding)
-            if share / STRICTER < strictest:
+            if share < ENOUGH * strictest:
                 strictest = share / STRICTER
                 strict = limits._replace(
                     opening2=limits.opening2 / 4,
@@ -183,9 +189,13 @@ class Problem:
 
     def solve(self, limits: Limits) -> NDArray[Any]:
         """Sums (4, k) at all targets, in the order of the tree."""
-        cells = self.targets.cells
-        branches, _ = divide_work(self.targets)
-        return self._walk([(int(cells[b, START]), int(cells[b, END])) for b in branches], limits)
+        n = self.targets.place.shape[1]
+        branches = self.targets.cells[divide_work(self.targets)[0], :2]
+        ends = np.arange(1, TASKS + 1) * n / TASKS
+        first = np.unique(np.searchsorted(branches[:, START], np.append(0, ends[:-1])))
+        starts = branches[first[first < len(branches)], START]
+        ranges = np.stack([starts, np.append(starts[1:], n)], axis=1)
+        return self._walk(ranges, len(ranges), limits)
 
     def unsorted(self, sums: NDArray[Any]) -> NDArray[np.float64]:
         """Sums in the order in which the targets came."""
@@ -195,7 +205,8 @@ class Problem:
         share(lambda k: unpermute(sums, order, result, *ranges[k]), len(ranges))
         return result
 
-    def _walk(self, ranges: list[tuple[int, int]], limits: Limits) -> NDArray[Any]:
+    def _walk(self, ranges: NDArray[np.int64], tasks: int, limits: Limits) -> NDArray[Any]:
+        """Sums at the targets in some ranges (k, 2) of rows, whole leaves, in a number of tasks."""
         walk = walker(self.law, self.plan.real, self.potential, self.plan.order)
         operations = translations(self.plan.order, self.law != "plummer")
         same, largest = self.targets is self.sources, largest_leaf(self.targets)
@@ -205,19 +216,21 @@ class Problem:
         for _ in range(threads()):
             desks.put(desk(operations, self.plan.real, largest, 1 << 16))
 
+        parts = np.array_split(ranges, tasks)
+
         def task(number: int) -> None:
             own = desks.get()
-            while walk(self.targets, self.sources, same, *ranges[number], limits, own, out):
+            while walk(self.targets, self.sources, same, parts[number], limits, own, out):
                 own = desk(operations, self.plan.real, largest, 2 * own.candidates.size)
             desks.put(own)
 
-        share(task, len(ranges))
+        share(task, tasks)
         return out
 
     def _sample(self) -> Sample:
         """Leaves in classes by radius, as the largest errors are those of few large leaves."""
         cells = self.targets.cells
-        leaves = np.flatnonzero(cells[:, SKIP] == np.arange(1, len(cells) + 1))
+        leaves = np.flatnonzero(cells[:, NUMBER] == 0)
         leaves = leaves[np.argsort(-self.targets.bodies[leaves, RADIUS], kind="stable")]
         counts = cells[leaves, END] - cells[leaves, START]
         chosen, weights, first, last = [np.arange(0)], [np.ones(0)], 0, LEAVES
@@ -229,12 +242,13 @@ class Problem:
             weights.append(np.full(number, counts[first:last].sum() / counts[some].sum()))
             first, last = last, 2 * last
         picked = np.concatenate(chosen)
-        ranges = [(int(start), int(end)) for start, end, _ in cells[leaves[picked]]]
+        ranges = cells[leaves[picked], :2].astype(np.int64)
         rows = np.concatenate([np.arange(*r) for r in ranges])
         return Sample(ranges, rows, np.repeat(np.concatenate(weights), counts[picked]))
 
     def _at(self, sample: Sample, limits: Limits) -> NDArray[np.float64]:
-        return self._walk(sample.ranges, limits)[:, sample.rows].astype(np.float64)
+        sums = self._walk(sample.ranges, min(4 * threads(), len(sample.ranges)), limits)
+        return sums[:, sample.rows].astype(np.float64)
 
     def _error(
         self, sample: Sample, tried: NDArray[np.float64], exact: NDArray[np.float64]
@@ -250,8 +264,8 @@ class Problem:
 class Sample:
     """Some targets that stand for all."""
 
-    ranges: list[tuple[int, int]]
-    """Rows in the order of the tree, whole leaves."""
+    ranges: NDArray[np.int64]
+    """(k, 2) rows in the order of the tree, first and last + 1, whole leaves."""
     rows: NDArray[np.intp]
     """The same one by one."""
     weight: NDArray[np.float64]

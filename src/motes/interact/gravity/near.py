@@ -24,7 +24,8 @@ ROUNDING = 6e-8
 def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
     """Compiled function that adds to `desk.total` the pull of source leaves on a target leaf.
 
-    (targets, sources, same, cell, leaves, limits, desk) -> None; `same`: the trees are one.
+    (targets, sources, same, cell, low, high, limits, desk) -> None: the leaves are candidates `low`
+    to `high`; `same`: the trees are one.
 
     In single precision, coordinates are taken from the leaf's center, and a target for which their
     rounding might matter, because a source is very close, is summed again in double precision.
@@ -88,8 +89,9 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
 
     @jit
     def sum_near(
-        targets: Tree, sources: Tree, same: Any, cell: Any, leaves: Any, limits: Limits, desk: Desk
-    ) -> None:
+        targets: Tree, sources: Tree, same: Any, cell: Any, low: Any, high: Any, limits: Limits,
+        desk: Desk,
+    ) -> None:  # fmt: skip
         cells, bodies = sources.cells, sources.bodies
         source, target, spans = desk.source, desk.target, desk.spans
         new_x, new_y, new_z, new_m = source[0], source[1], source[2], source[3]
@@ -105,13 +107,14 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
                 target[axis, i] = targets.near[axis, start + i]
         packed = pieces = 0
         distance, own = radius, (0, 0, 0)
-        for k in range(leaves.size):
-            leaf = leaves[k]
+        for k in range(low, high):
+            leaf = desk.candidates[k]
             first, last = cells[leaf, START], cells[leaf, END]
             itself = same and leaf == cell
             if itself and radius == 0.0:
                 if potential and depth > 0.0:
-                    desk.total[4, :count] += kind(bodies[leaf, MASS] * (depth / limits.size))
+                    for i in range(count):
+                        desk.total[4, i] += kind(bodies[leaf, MASS] * (depth / limits.size))
                 continue
             dx, dy, dz = bodies[leaf, X] - x, bodies[leaf, Y] - y, bodies[leaf, Z] - z
             reach = np.sqrt(dx * dx + dy * dy + dz * dz) + bodies[leaf, RADIUS]

@@ -19,10 +19,11 @@ from numba.extending import intrinsic
 
 from motes.interact.gravity import lanes as simd
 from motes.interact.gravity.lanes import LANES
+from motes.interact.gravity.tape import Array, Note, Tape, Total
 
 
-def traced(formula: Callable[..., None]) -> Callable[..., None]:
-    """An operation for kernels, from a formula of arrays and numbers.
+def traced(formula: Callable[..., None], looped: bool = False) -> Callable[..., None]:
+    """An operation for kernels, from a formula of arrays and numbers; `looped`: played from a tape.
 
     A two-dimensional array is seen as rows of LANES numbers, `rows[k]`, a one-dimensional one as
     numbers. Both may be assigned to. With lanes, a number is that number in each lane.
@@ -32,7 +33,14 @@ def traced(formula: Callable[..., None]) -> Callable[..., None]:
 
     def operation(typing: Any, *arguments: Any) -> Any:
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            formula(*(_wire(context, builder, *pair) for pair in zip(sig.args, args, strict=True)))
+            given = [_wire(context, builder, *pair) for pair in zip(sig.args, args, strict=True)]
+            if looped:
+                kinds = [a.element for a in given if isinstance(a, _Rows)]
+                tape = Tape(builder, kinds[0], Wire)
+                formula(*(_noted(tape, value) for value in given))
+                tape.play()
+            else:
+                formula(*given)
             return context.get_dummy_value()
 
         return types.void(*arguments), generate
@@ -46,6 +54,10 @@ def traced(formula: Callable[..., None]) -> Callable[..., None]:
 
 FLAGS = ("contract",)
 """Multiply-adds may be fused; the order of sums stands, as the compiler knows no better one."""
+
+
+PART = 4
+"""Numbers that a processor exchanges between registers in one step: 128 bits of single ones."""
 
 
 class Wire:
@@ -77,6 +89,9 @@ class Wire:
 
     __rmul__ = __mul__
 
+    def __truediv__(self, other: Any) -> Wire:
+        return self._with(other, self.builder.fdiv)
+
     def __neg__(self) -> Wire:
         return self * -1.0
 
@@ -99,6 +114,12 @@ class _Array:
 
     def lanes(self, place: Any) -> Wire:
         return Wire(self.builder, self.builder.load(self.pointer(place, True), align=self.align))
+
+    def part(self, place: Any) -> Any:
+        pointer = self.builder.bitcast(
+            self.builder.gep(self.data, [place]), ir.VectorType(self.element, PART).as_pointer()
+        )
+        return self.builder.load(pointer, align=self.align)
 
     def number(self, place: Any) -> Any:
         return self.builder.load(self.pointer(place, False))
@@ -133,8 +154,16 @@ def _index(k: int) -> Any:
     return ir.Constant(ir.IntType(64), k)
 
 
+def _noted(tape: Tape, value: Any) -> Any:
+    if isinstance(value, Wire):
+        return tape.given(value)
+    return Array(tape, value) if isinstance(value, _Array) else value
+
+
 def inverse_root(lanes: Any) -> Any:
     """1 / root of each lane."""
+    if isinstance(lanes, Note):
+        return lanes.tape.given(inverse_root(lanes.straight()))
     if not isinstance(lanes, Wire):
         return lanes.dtype.type(1) / np.sqrt(lanes)
     one = simd.constant(lanes.value.type.element, 1.0)
@@ -144,13 +173,30 @@ def inverse_root(lanes: Any) -> Any:
 
 def ones(like: Any) -> Any:
     """1 in each lane."""
+    if isinstance(like, Note):
+        return like.tape.note(1.0)
     if not isinstance(like, Wire):
         return np.ones_like(like)
     return Wire(like.builder, simd.constant(like.value.type.element, 1.0))
 
 
+def all_positive(*values: Any) -> Any:
+    """1 in each lane where all values are above 0, and 0 where one is not, or not a number."""
+    if not isinstance(values[0], Wire):
+        return np.logical_and.reduce([v > 0 for v in values]).astype(values[0].dtype)
+    builder, element = values[0].builder, values[0].value.type.element
+    zero = simd.constant(element, 0.0)
+    found = None
+    for value in values:
+        one = builder.fcmp_ordered(">", value.value, zero)
+        found = one if found is None else builder.and_(found, one)
+    return Wire(builder, builder.select(found, simd.constant(element, 1.0), zero))
+
+
 def total(lanes: Any) -> Any:
     """Sum over the lanes, a number."""
+    if isinstance(lanes, Note):
+        return Total(lanes, total)
     if not isinstance(lanes, Wire):
         return lanes.sum()
     return Wire(lanes.builder, simd.added(lanes.builder, lanes.value))
@@ -158,22 +204,43 @@ def total(lanes: Any) -> Any:
 
 def gathered(table: Any, chosen: Any, count: int) -> Sequence[Any]:
     """The first `count` columns of a table, lane k from row chosen[k]; its width fills lanes."""
+    if isinstance(table, Array):
+        return [table.tape.given(wire) for wire in gathered(table.array, chosen.array, count)]
     if not isinstance(table, _Array):
-        return [table[chosen, column].copy() for column in range(count)]
+        return [table[chosen[:LANES], column].copy() for column in range(count)]
     columns: list[Any] = []
     builder, long = table.builder, ir.IntType(64)
     rows = [
         builder.mul(builder.sext(chosen.number(_index(lane)), long), table.width)
         for lane in range(LANES)
     ]
-    for first in range(0, count, LANES):
-        block = [table.lanes(builder.add(row, _index(first))).value for row in rows]
-        columns += [Wire(builder, column) for column in _transposed(builder, block)]
+    for first in range(0, count, PART):
+        parts = [table.part(builder.add(row, _index(first))) for row in rows]
+        # Parts k, k + 4, k + 8 ... end to end; then columns, in each part apart from the others.
+        a, b, c, d = (simd.joined(builder, parts[k::PART]) for k in range(PART))
+        low, high = (0, LANES, 1, LANES + 1), (2, LANES + 2, 3, LANES + 3)
+        ab, ab_, cd, cd_ = (
+            _by_parts(builder, *pair, places) for pair in ((a, b), (c, d)) for places in (low, high)
+        )
+        left, right = (0, 1, LANES, LANES + 1), (2, 3, LANES + 2, LANES + 3)
+        columns += [
+            Wire(builder, _by_parts(builder, *pair, places))
+            for pair in ((ab, cd), (ab_, cd_))
+            for places in (left, right)
+        ]
     return columns[:count]
+
+
+def _by_parts(builder: Any, a: Any, b: Any, places: tuple[int, ...]) -> Any:
+    """The same shuffle in each part of two vectors, which a processor does in one step."""
+    return simd.shuffle(builder, a, b, [k + p for k in range(0, LANES, PART) for p in places])
 
 
 def scattered(columns: Sequence[Any], table: Any, first: Any) -> None:
     """Write lane k of all columns to row `first` + k of a table, whose width fills lanes."""
+    if isinstance(table, Array):
+        table.tape.keep(list(columns), lambda wires: scattered(wires, table.array, first))
+        return
     if not isinstance(table, _Array):
         for column, values in enumerate(columns):
             table[first : first + LANES, column] = values

@@ -9,7 +9,7 @@ operation is straight-line code for its order.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 from motes.interact.gravity.expansions import (
@@ -27,6 +27,9 @@ from motes.interact.gravity.expansions import (
 from motes.interact.gravity.lanes import LANES
 from motes.interact.gravity.traced import gathered, inverse_root, ones, scattered, total, traced
 
+STRAIGHT = 64
+"""Numbers in the longest expansion whose operations are straight-line code."""
+
 Operation = Callable[..., None]
 
 
@@ -43,10 +46,9 @@ class Translations(NamedTuple):
     those of its children; place[:3] is the parent's center from the child's and place[4] the
     child's radius, in the parent's radius; place[3] is 1, and 0 in unused lanes."""
     moments_to_local: Operation
-    """(place, chosen, table, h, e2, local): add to `local` (basis, LANES) the terms, in a cell of
-    radius h, of source cells whose moments are rows `chosen` of a table; place[:3] is the target's
-    center from the source's and place[4] its radius; place[3] is 1, and 0 in unused lanes; e2 is
-    the squared softening."""
+    """(balls, chosen, own, table, e2, local): add to `local` (basis, LANES) the terms, in a cell
+    with the ball `own`, of source cells whose balls and moments are rows `chosen` of two tables; e2
+    is the squared softening."""
     lanes_to_local: Operation
     """(local, terms): add the lane sums of `local` (basis, LANES) to terms (basis,)."""
     local_to_local: Operation
@@ -66,20 +68,21 @@ def translations(order: int, harmonic: bool) -> Translations:
     """The operations on expansions of one order."""
     kind = terms(order, harmonic)
     basis, every = kind.basis, kind.every
+    operation = partial(traced, looped=len(basis) > STRAIGHT)
 
-    @traced
+    @operation
     def particles_to_moments(place: Any, sums: Any) -> None:
         found = monomials(order, (place[0], place[1], place[2]), place[3])
         for row, t in enumerate(every):
             sums[row] = sums[row] + found[t]
 
-    @traced
+    @operation
     def sums_to_moments(sums: Any, moments: Any) -> None:
         whole = {t: sums[row] for row, t in enumerate(every)}
         for row, moment in enumerate(folded(kind, whole)):
             moments[row] = total(moment)
 
-    @traced
+    @operation
     def moments_to_moments(place: Any, chosen: Any, table: Any, moments: Any) -> None:
         power = powers(order, place[4], place[3])
         given = gathered(table, chosen, len(basis))
@@ -91,15 +94,18 @@ def translations(order: int, harmonic: bool) -> Translations:
         for row, moment in enumerate(folded(kind, dict(zip(every, new, strict=True)))):
             moments[row] = total(moment)
 
-    @traced
-    def moments_to_local(place: Any, chosen: Any, table: Any, h: Any, e2: Any, local: Any) -> None:
-        x, y, z = place[0], place[1], place[2]
+    @operation
+    def moments_to_local(
+        balls: Any, chosen: Any, own: Any, table: Any, e2: Any, local: Any
+    ) -> None:
+        ball = gathered(balls, chosen, 8)
+        x, y, z = (own[k] - ball[k] + (own[3 + k] - ball[3 + k]) for k in range(3))
         inverse = inverse_root(x * x + y * y + z * z + e2)
         slopes = derivatives(order, harmonic, (x * inverse, y * inverse, z * inverse), ones(x))
-        power = powers(order, place[4] * inverse, place[3] * inverse)
+        power = powers(order, ball[6] * inverse, inverse)
         given = gathered(table, chosen, len(basis))
         moments = {b: m * power[sum(b)] for b, m in zip(basis, given, strict=True)}
-        power = powers(order, h * inverse, ones(x))
+        power = powers(order, own[6] * inverse, ones(x))
         values = products(
             [
                 [(moments[b], slopes[plus(a, b)]) for b in basis if sum(a) + sum(b) <= order]
@@ -114,7 +120,7 @@ def translations(order: int, harmonic: bool) -> Translations:
         for row in range(len(basis)):
             terms[row] = terms[row] + total(local[row])
 
-    @traced
+    @operation
     def local_to_local(place: Any, terms: Any, table: Any, first: Any) -> None:
         whole = unfolded(kind, [terms[row] for row in range(len(basis))])
         shift = monomials(order, (place[0], place[1], place[2]), ones(place[0]))
@@ -127,7 +133,7 @@ def translations(order: int, harmonic: bool) -> Translations:
         )
         scattered([v * power[sum(a)] for a, v in zip(basis, new, strict=True)], table, first)
 
-    @traced
+    @operation
     def local_to_particles(place: Any, terms: Any, scale: Any, out: Any) -> None:
         whole = unfolded(kind, [terms[row] for row in range(len(basis))])
         shift = monomials(order, (place[0], place[1], place[2]), ones(place[0]))

@@ -16,8 +16,9 @@ from motes.interact.gravity.morton import LEVELS, morton_order
 from motes.interact.gravity.translations import padded, translations
 from motes.jit import blocks, jit, share
 
-START, END, SKIP = 0, 1, 2
+START, END, FIRST, NUMBER = 0, 1, 2, 3
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
+LOW, BALL_RADIUS, BALL_MASS = 3, 6, 7
 
 FEW = 4
 """Most particles in leaves that are much larger than usual.
@@ -29,6 +30,9 @@ only, and expansions around its center hardly converge at its edge.
 FINER = 1
 """Levels from a usual leaf up to one that is much larger."""
 
+NOTHING = (8.0, 8.0, 8.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+"""A ball without mass, outside of the box: what lanes that are left over are about."""
+
 LIGHT = 1e-30
 """Weight of massless particles in a center, where the masses of all are about 1."""
 
@@ -36,14 +40,16 @@ LIGHT = 1e-30
 class Tree(NamedTuple):
     """Particles in Morton order and the cells of their octree, as kernels take them.
 
-    A cell's children are the row after it, that one's SKIP, that one's SKIP ... until the cell's
-    own SKIP; a leaf's SKIP is the row after it.
+    A cell has NUMBER children, rows from FIRST on, and after them come all their descendants, those
+    of the first child first. A leaf has none; its FIRST is where they would be.
     """
 
     cells: NDArray[np.int32]
-    """(cells, 3) particles START to END, and SKIP, the row after the last descendant."""
+    """(cells, 4) particles START to END, and children from FIRST on, NUMBER of them."""
     bodies: NDArray[np.float64]
     """(cells, 5) center of mass, distance of the particle farthest from it, mass."""
+    balls: NDArray[Any]
+    """(cells + 1, 8) the same as the walk tests many of: `ball`, and a last row that is NOTHING."""
     order: NDArray[np.uint32]
     """(n,) row of each particle in the arrays that it came from."""
     place: NDArray[np.float64]
@@ -72,16 +78,15 @@ def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
 
     Leaves have at most `leaf` particles, or FEW if they fill a cube of a level under `coarse`.
     """
-    stack = np.empty((8 * LEVELS + 1, 3), np.int64)
-    stack[0, 0], stack[0, 1], stack[0, 2] = 0, key.size, 0
-    depth, count = 1, 0
+    stack, cuts = np.empty((8 * LEVELS + 1, 2), np.int64), np.empty(8, np.int64)
+    cells[0, START], cells[0, END] = 0, key.size
+    stack[0] = 0
+    depth, count = 1, 1
     while depth > 0:
         depth -= 1
-        start, end, level = stack[depth]
-        if count == cells.shape[0]:
-            return 0
-        cells[count, START], cells[count, END] = start, end
-        count += 1
+        cell, level = stack[depth]
+        start, end = cells[cell, START], cells[cell, END]
+        cells[cell, FIRST], cells[cell, NUMBER] = count, 0
         if end - start <= FEW:
             continue
         shift = np.uint64(3 * (LEVELS - 1 - level))
@@ -90,9 +95,11 @@ def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
             shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
         if level == LEVELS or (end - start <= leaf and level >= coarse):
             continue
-        # From the last octant to the first, so that the first child is the next to be taken.
+        if count + 8 > cells.shape[0]:
+            return 0
+        # From the last octant to the first.
         most = leaf if level + 1 >= coarse else FEW
-        high, octant = end, np.uint64(8)
+        high, octant, number = end, np.uint64(8), 0
         while octant > 0:
             # The widest half, quarter or octant that ends here and has few enough for a leaf.
             width = np.uint64(4)
@@ -105,15 +112,18 @@ def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
                 width >>= np.uint64(1)
             octant -= width
             if low < high:
-                stack[depth, 0], stack[depth, 1], stack[depth, 2] = low, high, level + 1
-                depth += 1
+                cuts[number] = low
+                number += 1
                 high = low
-    for back in range(count):
-        cell = count - 1 - back
-        after = cell + 1
-        while after < count and cells[after, END] <= cells[cell, END]:
-            after = cells[after, SKIP]
-        cells[cell, SKIP] = after
+        cells[cell, NUMBER] = number
+        for k in range(number):
+            # The first child is on top of the stack, and so the next to be taken.
+            child = count + number - 1 - k
+            cells[child, START] = cuts[k]
+            cells[child, END] = cuts[k - 1] if k > 0 else end
+            stack[depth, 0], stack[depth, 1] = child, level + 1
+            depth += 1
+        count += number
     return count
 
 
@@ -141,10 +151,10 @@ def unpermute(sums: Any, order: Any, result: Any, first: Any, last: Any) -> None
 def _measure(tree: Tree, cell: Any) -> None:
     """Fill in a cell's body, its children's being there."""
     cells, bodies, place = tree.cells, tree.bodies, tree.place
-    start, end, skip = cells[cell]
+    start, end, first_child, number = cells[cell]
     x = y = z = mass = 0.0
     weights = LIGHT * (end - start)
-    if skip == cell + 1:
+    if number == 0:
         for i in range(start, end):
             m = place[3, i]
             mass += m
@@ -153,15 +163,13 @@ def _measure(tree: Tree, cell: Any) -> None:
             y += m * place[1, i]
             z += m * place[2, i]
     else:
-        child = cell + 1
-        while child < skip:
+        for child in range(first_child, first_child + number):
             m = bodies[child, MASS]
             mass += m
             m += LIGHT * (cells[child, END] - cells[child, START])
             x += m * bodies[child, X]
             y += m * bodies[child, Y]
             z += m * bodies[child, Z]
-            child = cells[child, SKIP]
     weights += mass
     x, y, z = x / weights, y / weights, z / weights
     xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
@@ -171,12 +179,17 @@ def _measure(tree: Tree, cell: Any) -> None:
         r2 = max(r2, dx * dx + dy * dy + dz * dz)
     bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
     bodies[cell, RADIUS], bodies[cell, MASS] = np.sqrt(r2), mass
+    ball = tree.balls[cell]
+    for axis in range(3):
+        ball[axis] = bodies[cell, axis]
+        ball[LOW + axis] = bodies[cell, axis] - ball[axis]
+    ball[BALL_RADIUS], ball[BALL_MASS] = cell_unit(np.sqrt(r2)), mass
 
 
 @jit
 def _approach(tree: Tree, cell: Any, relative: bool) -> None:
     """Write a leaf's particles as the pairs see them."""
-    start, end, _ = tree.cells[cell]
+    start, end = tree.cells[cell, START], tree.cells[cell, END]
     for axis in range(3):
         old, new = tree.place[axis, start:end], tree.near[axis, start:end]
         center = tree.bodies[cell, axis] if relative else 0.0
@@ -200,7 +213,7 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
 
     @jit
     def moments_of_leaf(tree: Tree, cell: Any, place: Any, sums: Any) -> None:
-        start, end, _ = tree.cells[cell]
+        start, end = tree.cells[cell, START], tree.cells[cell, END]
         body = tree.bodies[cell]
         scale = 1.0 / cell_unit(body[RADIUS])
         sums[:] = 0
@@ -216,21 +229,21 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
 
     @jit
     def moments_of_parent(tree: Tree, cell: Any, place: Any, chosen: Any) -> None:
-        bodies, skip = tree.bodies, tree.cells[cell, SKIP]
+        bodies = tree.bodies
+        first, number = tree.cells[cell, FIRST], tree.cells[cell, NUMBER]
         body = bodies[cell]
         scale = 1.0 / cell_unit(body[RADIUS])
-        child = cell + 1
         for lane in range(LANES):
-            chosen[lane] = cell + 1
+            child = first + lane
+            chosen[lane] = first
             place[3, lane] = 0.0
-            if child < skip:
+            if lane < number:
                 chosen[lane] = child
                 place[0, lane] = (body[X] - bodies[child, X]) * scale
                 place[1, lane] = (body[Y] - bodies[child, Y]) * scale
                 place[2, lane] = (body[Z] - bodies[child, Z]) * scale
                 place[3, lane] = 1.0
                 place[4, lane] = cell_unit(bodies[child, RADIUS]) * scale
-                child = tree.cells[child, SKIP]
         moments_to_moments(place, chosen, tree.moments, tree.moments[cell])
 
     @jit
@@ -239,7 +252,7 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
     ) -> None:
         for back in range(last - first):
             cell = last - 1 - back
-            is_leaf = tree.cells[cell, SKIP] == cell + 1
+            is_leaf = tree.cells[cell, NUMBER] == 0
             _measure(tree, cell)
             if is_leaf:
                 _approach(tree, cell, relative)
@@ -288,21 +301,21 @@ def octree(points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int)
         len(ranges),
     )
     nothing = np.empty((0, 0))
-    return Tree(cells, np.empty((len(cells), 5)), order, place, nothing, nothing)
+    return Tree(cells, np.empty((len(cells), 5)), nothing, order, place, nothing, nothing)
 
 
 def _cells(key: NDArray[np.uint64], leaf: int, coarse: int) -> NDArray[np.int32]:
     capacity, count = 64 + 4 * len(key) // leaf, 0
     while not count:
         capacity *= 2
-        cells: NDArray[np.int32] = np.empty((capacity, 3), np.int32)
+        cells: NDArray[np.int32] = np.empty((capacity, 4), np.int32)
         count = _divide(key, leaf, coarse, cells)
     return cells[:count].copy()
 
 
 def _usual_level(key: NDArray[np.uint64], cells: NDArray[np.int32]) -> int:
     """Level of the cube around the leaf of the median particle, leaves sorted by that."""
-    leaves = cells[cells[:, SKIP] == np.arange(1, len(cells) + 1)]
+    leaves = cells[cells[:, NUMBER] == 0]
     apart = key[leaves[:, START]] ^ key[leaves[:, END] - 1]
     level = LEVELS - np.ceil(np.frexp(apart.astype(np.float64))[1] / 3)
     order = np.argsort(level)
@@ -314,26 +327,39 @@ def summarize(tree: Tree, order: int, harmonic: bool, real: type, sources: bool)
     """The tree with bodies, and for `sources` moments, filled in from places and masses."""
     branches, stem = divide_work(tree)
     operations, fill = translations(order, harmonic), _summation(order, harmonic)
-    count = len(tree.cells) if sources else 0
+    count = len(tree.cells) + 1 if sources else 0
     near: NDArray[Any] = np.empty((4, tree.place.shape[1] + LANES), real)
     near[:, -LANES:] = 0
-    tree = tree._replace(moments=np.zeros((count, padded(operations.basis)), real), near=near)
+    balls: NDArray[Any] = np.empty((len(tree.cells) + 1, 8), real)
+    balls[-1] = NOTHING
+    moments: NDArray[Any] = np.zeros((count, padded(operations.basis)), real)
+    tree = tree._replace(moments=moments, near=near, balls=balls)
 
     def cells(first: int, last: int) -> None:
         place: NDArray[Any] = np.ones((5, LANES), real)
         sums: NDArray[Any] = np.empty((operations.every, LANES), real)
         fill(tree, first, last, real is np.float32, place, np.zeros(LANES, np.int32), sums)
 
-    share(lambda k: cells(branches[k], int(tree.cells[branches[k], SKIP])), len(branches))
+    def branch(k: int) -> None:
+        cells(int(tree.cells[branches[k], FIRST]), _end(tree, branches[k]))
+        cells(branches[k], branches[k] + 1)
+
+    share(branch, len(branches))
     for cell in reversed(stem):
         cells(cell, cell + 1)
     return tree
 
 
+def _end(tree: Tree, cell: int) -> int:
+    """The row after a cell's last descendant."""
+    first, number = (int(k) for k in tree.cells[cell, [FIRST, NUMBER]])
+    return _end(tree, first + number - 1) if number else first
+
+
 def largest_leaf(tree: Tree) -> int:
     """Most particles in a leaf."""
     cells = tree.cells
-    leaves = cells[:, SKIP] == np.arange(1, len(cells) + 1)
+    leaves = cells[:, NUMBER] == 0
     return int((cells[leaves, END] - cells[leaves, START]).max())
 
 
@@ -341,13 +367,13 @@ def divide_work(tree: Tree) -> tuple[list[int], list[int]]:
     """Cells whose descendants are one task each, and the cells above them."""
     n = tree.place.shape[1]
     limit = min(max(n // 64, 64), 8192)
-    branches, stem, cell = [], [], 0
-    while cell < len(tree.cells):
-        start, end, skip = (int(v) for v in tree.cells[cell])
-        if end - start <= limit or skip == cell + 1:
+    branches, stem, waiting = [], [], [0]
+    while waiting:
+        cell = waiting.pop()
+        start, end, first, number = (int(v) for v in tree.cells[cell])
+        if end - start <= limit or not number:
             branches.append(cell)
-            cell = skip
         else:
             stem.append(cell)
-            cell += 1
+            waiting += reversed(range(first, first + number))
     return branches, stem
