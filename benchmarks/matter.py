@@ -113,7 +113,7 @@ def main() -> None:
         compare(report, atoms, options.quick)
     for atoms in options.flat:
         cells = cells_of(atoms)
-        steps = max(5, min(100, int(3e6 / (4 * cells**3))))
+        steps = max(8, min(100, int(2e7 / (4 * cells**3))))
         for precision in options.precision:
             speed = ours(melted(cells, steps, precision), steps)
             report.figures[f"motes, {precision}, {4 * cells**3} atoms"] = (speed / 1e6, "M/s")

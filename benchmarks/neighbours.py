@@ -83,13 +83,15 @@ def matscipy_tasks(x: np.ndarray, radius: float) -> Iterator[Task]:
     yield "both ways", "matscipy", lambda: neighbour_list("ij", cutoff=radius, **cell)
 
 
-def measure(n: int, repeats: int) -> dict[str, dict[str, float]]:
+def measure(n: int, repeats: int, tasks: list[str]) -> dict[str, dict[str, float]]:
     """Seconds by task and program; the first call of ours, which may compile, is left out."""
     x = np.random.default_rng(0).random((n, 3))
     radius = (NEIGHBOURS / (4 / 3 * np.pi * n)) ** (1 / 3)
     seconds: dict[str, dict[str, float]] = {}
     for source in (ours, scipy_tasks, freud_tasks, matscipy_tasks):
         for task, program, call in source(x, radius):
+            if task not in tasks:
+                continue
             if source is ours:
                 call()
             seconds.setdefault(task, {})[program] = best(call, repeats)
@@ -101,8 +103,9 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--points", type=int, nargs="+", default=[100_000, 1_000_000])
     parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--tasks", nargs="+", default=["pairs", "both ways", "nearest"])
     arguments = parser.parse_args()
-    seconds = {n: measure(n, arguments.repeats) for n in arguments.points}
+    seconds = {n: measure(n, arguments.repeats, arguments.tasks) for n in arguments.points}
     ratios = {
         n: {
             task: {peer: value / by["motes"] for peer, value in by.items() if peer != "motes"}

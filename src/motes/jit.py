@@ -17,6 +17,7 @@ import hashlib
 import os
 import pickle
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache, partial, update_wrapper
@@ -353,45 +354,18 @@ def share(task: Callable[[int], Any], count: int) -> None:
     tasks that have not begun and waits for the running ones, each of which should take at most
     about 100 ms.
     """
-    global _pool
-    if count <= 1 or threads() == 1:
-        for number in range(count):
-            task(number)
-        return
-    if _pool is None:
-        _pool = ThreadPoolExecutor(threads(), "motes")
     numbers = iter(range(count))  # Each thread takes the next one.
 
     def work() -> None:
         for number in numbers:
             task(number)
 
-    helpers = [_pool.submit(work) for _ in range(min(threads(), count) - 1)]
-    try:
-        work()
-        for helper in helpers:
-            helper.result()
-    except BaseException:
-        for _ in numbers:
-            pass
-        wait(helpers)
-        raise
+    _together(work, count, lambda: deque(numbers, 0))
 
 
-AT_ONCE = 16
-"""Calls that a thread does before it looks whether it was interrupted."""
-
-
-def _share_out(run: Callable[[Any, int], None], count: int) -> None:
-    """Run calls that are taken from a counter, on the threads."""
+def _together(work: Callable[[], None], count: int, drop: Callable[[], Any]) -> None:
+    """Work on all threads that so many tasks are enough for; `drop` takes away what is left."""
     global _pool
-    counter = ctypes.c_int64(0)
-    address = ctypes.addressof(counter)
-
-    def work() -> None:
-        while counter.value < count:
-            run(address, AT_ONCE)
-
     helpers = []
     if count > 1 and threads() > 1:
         if _pool is None:
@@ -402,9 +376,24 @@ def _share_out(run: Callable[[Any, int], None], count: int) -> None:
         for helper in helpers:
             helper.result()
     except BaseException:
-        counter.value = count
+        drop()
         wait(helpers)
         raise
+
+
+AT_ONCE = 16
+"""Calls that a thread does before it looks whether it was interrupted."""
+
+
+def _share_out(run: Callable[[Any, int], None], count: int) -> None:
+    """Run calls that are taken from a counter, on the threads."""
+    counter = ctypes.c_int64(0)
+
+    def work() -> None:
+        while counter.value < count:
+            run(ctypes.addressof(counter), AT_ONCE)
+
+    _together(work, count, lambda: setattr(counter, "value", count))
 
 
 def blocks(rows: int, size: int) -> list[tuple[int, int]]:

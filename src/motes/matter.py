@@ -16,7 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 if TYPE_CHECKING:
     from motes.simulation import Simulation
 
-__all__ = ["Thermo", "lj_melt", "local_order", "radial_distribution", "thermo"]
+__all__ = [
+    "Thermo", "energy", "lj_melt", "local_order", "pressure", "radial_distribution", "temperature",
+    "thermo", "virial",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,30 @@ def thermo(sim: Simulation, boltzmann: float = 1.0) -> Thermo:
     )
 
 
+def energy(sim: Simulation) -> tuple[float, float]:
+    """Kinetic and potential energy of all particles of a simulation, now [J].
+
+    Sums of m v^2 / 2, and of U(r) over all pairs. Source: Allen and Tildesley (2017), section 2.4.
+    """
+    measures = sim.measure()
+    return measures.kinetic, measures.potential
+
+
+def virial(sim: Simulation) -> float:
+    """W = sum over pairs r . f, now [J], as Allen and Tildesley (2017), equation 2.60."""
+    return thermo(sim).virial
+
+
+def temperature(sim: Simulation, boltzmann: float = 1.0) -> float:
+    """2 E_kin / (dof k), now, as in `thermo`."""
+    return thermo(sim, boltzmann).temperature
+
+
+def pressure(sim: Simulation) -> float:
+    """(2 E_kin + W) / (3 V), now [Pa], as in `thermo`; NaN where space is not a periodic box."""
+    return thermo(sim).pressure
+
+
 def radial_distribution(
     x: ArrayLike, box: Any, cutoff: float, bins: int = 100
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -100,14 +127,14 @@ def radial_distribution(
     return (edges[1:] + edges[:-1]) / 2, 2 * count * np.prod(size) / (n * n * shells)
 
 
-def local_order(x: ArrayLike) -> NDArray[np.float64]:
+def local_order(x: ArrayLike, box: Any = None) -> NDArray[np.float64]:
     """How much the surroundings of points are those of a crystal, from 0 to 1, (n,).
 
     max(0, 1 - 14 c), with c the centrosymmetry of the 12 nearest neighbours at r_k: the sum over
     the 6 most opposite pairs of |r_i + r_j|^2, divided by 2 sum |r_k|^2. It is 1 inside a crystal
-    with cubic close packing, and near 0 in a liquid and at a surface. `x`: (n, 3) points [m] in
-    open space. Source: Kelchner, Plimpton and Hamilton, Physical Review B 58 (1998) 11085,
-    equation 1.
+    with cubic close packing, and near 0 in a liquid and at a surface. `x`: (n, 3) points [m].
+    `box`: the period, or one for each axis [m]; None in open space. Source: Kelchner, Plimpton and
+    Hamilton, Physical Review B 58 (1998) 11085, equation 1.
     """
     from motes.neighbours import nearest
 
@@ -116,10 +143,13 @@ def local_order(x: ArrayLike) -> NDArray[np.float64]:
     if len(points) < 13:
         return order
     first, second = np.triu_indices(12, 1)
-    neighbours, _ = nearest(points, 12)
+    neighbours, _ = nearest(points, 12, box)
+    size = np.broadcast_to(np.asarray(np.inf if box is None else box, float), (3,))
+    closed = np.isfinite(size)
     for begin in range(0, len(points), 1 << 13):
         rows = slice(begin, begin + (1 << 13))
         away = points[neighbours[rows]] - points[rows][:, None]
+        away[..., closed] -= size[closed] * np.round(away[..., closed] / size[closed])
         sums = ((away[:, first] + away[:, second]) ** 2).sum(axis=2)
         six = np.sort(sums, axis=1)[:, :6].sum(axis=1)
         whole = 2 * (away**2).sum(axis=(1, 2))

@@ -521,6 +521,30 @@ def test_a_film_needs_no_numba(tmp_path):
     assert done.stdout.strip() == "False", done.stderr
 
 
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_vectors_change_lanes_as_plain_python_says(real):
+    from motes.machine.shuffles import near_slots, taken_apart
+
+    rng = np.random.default_rng(4)
+    records, slots = rng.random((50, 4)).astype(real), rng.integers(0, 50, 64).astype(np.int32)
+
+    def columns(records, slots, out):
+        taken_apart(records, slots, out[0], out[1], out[2])
+
+    same(columns, records, slots, np.zeros((3, 64), real))
+    x, limit = rng.random((3, 64)).astype(real), real(0.16)
+
+    def near(x, limit, slots, out):
+        half = limit - limit + x.dtype.type(0.5)
+        return near_slots(half, half, half, limit, np.int32(slots[3]), x[0], x[1], x[2], slots, out)
+
+    places = np.full(80, -1, np.int32), np.full(80, -1, np.int32)
+    found = compiled(near)(x, limit, slots, places[0])
+    assert found == near(x, limit, slots, places[1])
+    assert 3 < found < 64
+    assert (places[0][:found] == places[1][:found]).all()
+
+
 # ---------------------------------------------------------------------------- lanes
 
 

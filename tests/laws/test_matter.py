@@ -269,3 +269,74 @@ def test_faults_of_matter_are_said_in_one_line() -> None:
     sim = motes.Simulation(motes.Scene(systems=[drawn]))
     with pytest.raises(motes.SceneError, match="cannot draw"):
         sim.place("a", [[0.0, 0, 0]])
+
+
+def test_a_pile_of_hard_spheres_comes_to_rest() -> None:
+    """What is left is what gravity adds in a few steps, (g h)^2 / 2 each; nobody sinks in."""
+    floor = {"type": "plane", "position": (0, 0, 0.05)}
+    sides = [
+        {"type": "plane", "name": name, "position": at, "rotation": turn}
+        for name, at, turn in (
+            ("left", (-0.2, 0, 0), (0, 90, 0)), ("right", (0.2, 0, 0), (0, -90, 0)),
+            ("back", (0, 0.2, 0), (90, 0, 0)), ("front", (0, -0.2, 0), (-90, 0, 0)),
+        )
+    ]  # fmt: skip
+    scene = motes.Scene(
+        systems=[motes.System("grains", size=0.1)],
+        interact=[motes.interact.HardSpheres(restitution=0.35, friction=0.45)],
+        force=[motes.force.Gravity()], solid=[floor, *sides], step=0.004,
+        integrator="semi_implicit_euler",
+    )  # fmt: skip
+    sim = motes.Simulation(scene)
+    grid = np.stack(np.meshgrid(*[np.arange(4)] * 2, np.arange(14)), -1).reshape(-1, 3)
+    jitter = np.random.default_rng(3).random(grid.shape) * 0.02
+    sim.place("grains", (grid - [1.5, 1.5, -1]) * 0.12 * [0.8, 0.8, 1] + jitter)
+    sim.run(until=3.0)
+    speeds = (sim["grains"].velocity ** 2).sum(axis=1)
+    assert 0.5 * speeds.mean() < 4 * 0.5 * (9.81 * 0.004) ** 2
+    assert sim["grains"].position[:, 2].min() > 0.05 - 1e-3
+    assert sim["grains"].position[:, 2].max() > 0.8
+
+
+def test_energy_and_pressure_are_those_of_thermo() -> None:
+    sim = lj_melt(cells=4)
+    state = thermo(sim)
+    kinetic, potential = motes.matter.energy(sim)
+    assert kinetic == pytest.approx(1.5 * 1.44 * (sim.count - 1), rel=1e-12)
+    assert potential == pytest.approx(-6.7733681 * sim.count, rel=1e-7)
+    assert kinetic + potential == pytest.approx(state.total * sim.count, rel=1e-14)
+    volume = np.prod(sim.scene.periodic.size)
+    assert motes.matter.virial(sim) == state.virial
+    expected = (2 * kinetic + state.virial) / (3 * volume)
+    assert motes.matter.pressure(sim) == pytest.approx(expected, rel=1e-14)
+    assert motes.matter.temperature(sim, 2.0) == pytest.approx(1.44 / 2, rel=1e-12)
+
+
+def test_local_order_knows_periodic_space() -> None:
+    """A crystal without a surface is in order everywhere; shaken, nowhere."""
+    crystal = lj_melt(cells=4)
+    x, size = crystal["atoms"].position, crystal.scene.periodic.size
+    assert motes.matter.local_order(x, size).min() > 1 - 1e-9
+    assert motes.matter.local_order(x).min() < 0.1
+    shaken = x + np.random.default_rng(1).normal(size=x.shape) * 0.35
+    order = motes.matter.local_order(shaken, size)
+    assert np.median(order) < 0.25
+    moved = (shaken + np.array([1.3, 2.9, 0.4])) % np.array(size)
+    assert motes.matter.local_order(moved, size) == pytest.approx(order, abs=1e-9)
+
+
+def test_a_ball_is_brightest_where_it_faces_the_light() -> None:
+    """Lambert's law in steps: smaller, brighter dots, each nearer to the light, within the ball."""
+    light = np.array([0.6, 0.0, 0.8])
+    p = SimpleNamespace(light=tuple(3 * light), shade=0.25)
+    parts = catalog("look")["balls"].kernel("figure")(p, 0.0, 0.0)
+    places, sizes = np.array([q[:3] for q in parts]), np.array([q[3] for q in parts])
+    tones = np.array([q[4] for q in parts])
+    assert tones[0] == pytest.approx(0.25)
+    assert tones[2] == pytest.approx(1.0)
+    assert (np.diff(tones) > 0).all()
+    assert (np.diff(sizes) < 0).all()
+    along = places @ light
+    assert (np.diff(along) > 0).all()
+    assert np.linalg.norm(places - along[:, None] * light, axis=1).max() < 1e-12
+    assert (along + sizes / 2 <= 0.5 + 1e-9).all()  # In units of the ball's diameter.

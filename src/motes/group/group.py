@@ -17,6 +17,7 @@ from motes.compile.pairs import Law
 from motes.errors import SceneError
 from motes.group.capture import Captures
 from motes.group.constrain import Constraints, Ground
+from motes.group.contacts import Contacts, Planes
 from motes.group.lasting import Body, Lasting
 from motes.group.members import Bodies, Member, Movers, Occasion
 from motes.group.methods import implicit_stages, runge_kutta, split
@@ -47,6 +48,7 @@ class Group:
         laws = having(interactions, "velocities")
         self.constraints = Constraints(laws, Ground(solids if laws else ()))
         self.captures = Captures(having(interactions, "captures"))
+        self.contacts = Contacts(solids if self.exchanges else ())
         self._strict, self._periodic = strict, periodic
         self.nearby = self._nearby(precision)
         motions = [stepper.system.motion for stepper in steppers.values()]
@@ -173,7 +175,11 @@ class Group:
             size = stepper.trait("size", rows, n, interval.end)
             x, v = rows.position[:, :n], rows.velocity[:, :n]
             movers.append(Movers(name, x, v, mass, size, rows.ids[:n]))
-        when = Occasion(interval.length, memory.steps, address, seed, self._periodic)
+
+        def planes(position: NDArray[Any], reach: float) -> Planes:
+            return self.contacts.near(position, reach, interval.end)
+
+        when = Occasion(interval.length, memory.steps, address, seed, self._periodic, planes)
         if kernel(part, "exchange")(p, movers, when):
             memory.push = None
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from motes.group.contacts import Planes
 from motes.group.lasting import Body
 from motes.interact.arrange import Box
 from motes.jit import blocks, each
@@ -55,6 +56,8 @@ class Occasion:
     address: str
     seed: int
     periodic: Box
+    planes: Callable[[NDArray[Any], float], Planes]
+    """Solids that collide within a reach [m] of positions (3, n) [m], as planes."""
 
 
 @dataclass

@@ -303,7 +303,8 @@ def _carried_out(kernel: Any, head: Any, work: list[Any], room: Room) -> list[An
 
 def _wider(one: Any, begin: int, points: int) -> Any:
     """A part's work with room to go on from a cluster that has so many candidates."""
-    cluster, places, first, entry = one[1], *one[-3:]
+    cluster = one[1]
+    places, first, entry = one[-3:]
     if points > places.slot.size:
         places = _candidates(2 * points, places.position.dtype)
     held, most = LANES * int(first.max()), CLUSTER * (points + LANES)

@@ -20,6 +20,7 @@ class HardSpheres:
     Where two have come to overlap in a step and still approach each other, an impulse along the
     line of their centres makes the relative velocity -restitution times what it was, Coulomb's
     friction opposes sliding, and both are moved apart; in rounds, since one leads to the next.
+    Spheres that touch a solid collide with it in the same rounds, so that piles stand on the floor.
     Momentum is kept to rounding. Source: Moreau, in Nonsmooth Mechanics and Applications (1988).
     """
 
@@ -29,8 +30,9 @@ class HardSpheres:
     friction: Number = quantity(0.3, "", at_least=0)
     """Coefficient of friction between spheres."""
 
-    rest_speed: Number = quantity(0.02, "m/s", at_least=0)
-    """Speed of approach below which spheres do not bounce, so that piles come to rest."""
+    rest_speed: Number = quantity(0.1, "m/s", at_least=0)
+    """Speed of approach below which spheres do not bounce, so that piles come to rest; above what
+    forces add to a speed in a step."""
 
     rounds: Integer = quantity(12, at_least=1, at_most=1000)
     """Most rounds of collisions in a step; piles need more of them."""
@@ -53,8 +55,9 @@ class HardSpheres:
         period = np.where(box > 0, box, np.inf)
         found = _around((x - low[:, None]).T, None, float(size.max()), period, Who.LATER)
         far = np.where(box > 0, box, 1e300)
+        planes = when.planes(x, 0.5 * float(size.max()))
         law = p.restitution, p.friction, p.rest_speed, p.rounds
-        if not collide(found.first, found.row, x, v, m, size, far, *law):
+        if not collide(found.first, found.row, x, v, m, size, far, x.copy(), *planes, *law):
             return False
         back = np.empty_like(order)
         back[order] = np.arange(order.size)

@@ -30,6 +30,6 @@ class Balls:
         light = np.asarray(p.light, float)
         light = light / max(float(np.linalg.norm(light)), 1e-9)
         parts: list[Any] = []
-        for far, size, lit in ((0.0, 1.0, 0.0), (0.12, 0.8, 0.5), (0.24, 0.55, 1.0)):
+        for far, size, lit in ((0.0, 1.0, 0.0), (0.1, 0.8, 0.5), (0.22, 0.55, 1.0)):
             parts.append((*(far * light), size, p.shade + (1 - p.shade) * lit, 1.0, False))
         return [*parts, (*(0.38 * light), 0.22, 1.7, 0.8, False)]

@@ -291,7 +291,9 @@ class Calls(Memory):
         from motes.machine.target import moves_lanes
 
         if not moves_lanes():
-            return self.call_function(near_slots, near_slots, given)
+            plain = plain_function(near_slots)
+            assert plain is not None
+            return self.call_function(near_slots, plain, given)
         views = self._packed(*given[5:])
         item = views[0].type.item
         numbers = [self.cast(self._number(value), item).text for value in given[:4]]

@@ -75,25 +75,25 @@ def taking(real: str) -> str:
             order = [(0, 2), (1, 3)]
         else:
             order = [(k, k + 4) for k in range(pairs)]
-        return [text.shuffle(small, parts[first + a], parts[first + b], both) for a, b in order]
+        return [text.shuffle(small, (parts[first + a], parts[first + b]), both) for a, b in order]
 
     if wide:
         xy, zw = joined(0), joined(1)
         found = [
-            text.shuffle(whole, *xy, (0, 4, 2, 6)),
-            text.shuffle(whole, *xy, (1, 5, 3, 7)),
-            text.shuffle(whole, *zw, (0, 4, 2, 6)),
+            text.shuffle(whole, xy, (0, 4, 2, 6)),
+            text.shuffle(whole, xy, (1, 5, 3, 7)),
+            text.shuffle(whole, zw, (0, 4, 2, 6)),
         ]
     else:
         a, b, c, d = joined(0)
         low, high = (0, 8, 1, 9, 4, 12, 5, 13), (2, 10, 3, 11, 6, 14, 7, 15)
         first, second = (0, 1, 8, 9, 4, 5, 12, 13), (2, 3, 10, 11, 6, 7, 14, 15)
-        xy = [text.shuffle(whole, a, b, low), text.shuffle(whole, c, d, low)]
-        zw = [text.shuffle(whole, a, b, high), text.shuffle(whole, c, d, high)]
+        xy = [text.shuffle(whole, (a, b), low), text.shuffle(whole, (c, d), low)]
+        zw = [text.shuffle(whole, (a, b), high), text.shuffle(whole, (c, d), high)]
         found = [
-            text.shuffle(whole, *xy, first),
-            text.shuffle(whole, *xy, second),
-            text.shuffle(whole, *zw, first),
+            text.shuffle(whole, xy, first),
+            text.shuffle(whole, xy, second),
+            text.shuffle(whole, zw, first),
         ]
     for axis, value in zip("xyz", found, strict=True):
         at = text.do(f"getelementptr inbounds {real}, ptr %{axis}, i64 %q")
@@ -133,7 +133,7 @@ def seeking(real: str) -> str:
         total = text.do(f"fadd {kind} {squares[0]}, {squares[1]}")
         total = text.do(f"fadd {kind} {total}, {squares[2]}")
         near.append(text.do(f"fcmp ole {kind} {total}, {own['limit']}"))
-    inside = near[0] if not wide else text.shuffle("<4 x i1>", *near, tuple(range(LANES)))
+    inside = near[0] if not wide else text.shuffle("<4 x i1>", near, tuple(range(LANES)))
     at = text.do("getelementptr inbounds i32, ptr %slots, i64 %q")
     slot = text.do(f"load <8 x i32>, ptr {at}, align 4")
     others = text.do(f"icmp ne <8 x i32> {slot}, {me}")
@@ -172,13 +172,14 @@ class _Text:
         self.add(f"%t{self._number} = {text}")
         return f"%t{self._number}"
 
-    def shuffle(self, kind: str, a: str, b: str, order: Sequence[int]) -> str:
+    def shuffle(self, kind: str, pair: Sequence[str], order: Sequence[int]) -> str:
+        a, b = pair
         mask = ", ".join(f"i32 {k}" for k in order)
         return self.do(f"shufflevector {kind} {a}, {kind} {b}, <{len(order)} x i32> <{mask}>")
 
     def spread(self, kind: str, item: str, value: str, lanes: int) -> str:
         one = self.do(f"insertelement {kind} poison, {item} {value}, i64 0")
-        return self.shuffle(kind, one, "poison", [0] * lanes)
+        return self.shuffle(kind, (one, "poison"), [0] * lanes)
 
     def begin(self, carried: tuple[str, str] | None = None) -> None:
         self.add("br label %top", "top:", "%q = phi i64 [ 0, %head ], [ %next, %body ]")
