@@ -18,8 +18,8 @@ from motes.interact.gravity.desk import Desk, Limits, desk
 from motes.interact.gravity.translations import translations
 from motes.interact.gravity.tree import (
     END,
-    RADIUS,
     NUMBER,
+    RADIUS,
     START,
     Box,
     Tree,
