@@ -88,7 +88,7 @@ class Tape:
         return self.constants[value]
 
     def given(self, read: Callable[[], Any]) -> Note:
-        """A note of lanes, or of a number for each lane, that are read before the tape is played."""
+        """A note of lanes, or of a number for each, that are read before the tape is played."""
         note = self.known(read)
         self.first.append(lambda: self.write(self.place[note], read()))
         return note
