@@ -26,6 +26,12 @@ def best(task: Callable[[], object], repeats: int = 5) -> float:
     return min(times)
 
 
+def best_in_turn(*tasks: Callable[[], object], repeats: int) -> list[float]:
+    """Shortest time of each of several tasks [s] that are called in turn."""
+    times = [[best(task, 1) for task in tasks] for _ in range(repeats)]
+    return [min(column) for column in zip(*times, strict=True)]
+
+
 def arguments(about: str) -> argparse.ArgumentParser:
     """The options that every benchmark has."""
     parser = argparse.ArgumentParser(description=about.splitlines()[0])

@@ -6,7 +6,7 @@ SciPy's cKDTree (all processors search), and Blender's boids, if a Python with t
 given (`--bpy`, or the environment variable MOTES_BPY). Blender compares every boid with every
 other, so that its figure falls with their number; it is measured at 2 000.
 Crowds: reciprocal avoidance of the ten nearest, a person on two square metres, everybody with a
-goal; the wanted velocities are given and positions advanced.
+goal; the wanted velocities are given and positions advanced; and a scene with forces and a wall.
 """
 
 from __future__ import annotations
@@ -147,6 +147,43 @@ def crowd(n: int, slows: bool, steps: int = 8) -> float:
     return n / float(np.median(times[2:])) / 1e6
 
 
+def walkers(n: int, steps: int = 10) -> float:
+    """Millions of agent-steps a second of a whole simulation: two streams on a square."""
+    edge = float(np.sqrt(2.0 * n))
+    systems = [
+        motes.System(
+            name,
+            size=0.5,
+            emit=[
+                motes.emit.Parties(
+                    burst=[{"count": n // 2}], members=1, size=(edge, edge, 0), position=away
+                )
+            ],
+            force=[
+                motes.force.Goal(place=place, along=(1, 0, 0), speed={"mean": 1.3, "spread": 0.2}),
+                motes.force.Wander(strength=0.3, along=(1, 1, 0)),
+            ],
+        )
+        for name, place, away in (
+            ("east", (1e4, 0, 0), (0, 0, 0)),
+            ("west", (-1e4, 0, 0), (1, 1, 0)),
+        )
+    ]
+    sim = motes.Simulation(
+        motes.Scene(
+            systems=systems,
+            interact=[motes.interact.Crowd()],
+            solid=[motes.solid.Box(position=(0, 0, 1), size=(2, 9, 2), collides=False)],
+            integrator="semi_implicit_euler",
+            step=0.1,
+        )
+    )
+    sim.run(steps=3)
+    start = time.perf_counter()
+    sim.run(steps=steps)
+    return n * steps / (time.perf_counter() - start) / 1e6
+
+
 def main() -> None:
     parser = arguments(__doc__ or "")
     parser.add_argument("--bpy", default=os.environ.get("MOTES_BPY", ""), help="Python with bpy")
@@ -166,6 +203,10 @@ def main() -> None:
         report.figures[f"motes, {FEW} boids"] = (ours(FEW, 2.0), "M boid-steps/s")
     report.figures["motes, crowd of 100 000"] = (crowd(100_000, False), "M agent-steps/s")
     report.figures["the same, density slows"] = (crowd(100_000, True), "M agent-steps/s")
+    report.figures["100 000 in a scene, with forces and a wall"] = (
+        walkers(100_000),
+        "M agent-steps/s",
+    )
     report.ratio("motes, boids", "NumPy and cKDTree")
     report.ratio(f"motes, {FEW} boids", f"Blender, {FEW} boids")
     report.notes.append(f"{n} boids, about {SEEN} in sight.")

@@ -16,7 +16,7 @@ from motes.catalog import Component
 from motes.control.constant import Constant
 from motes.control.curve import Curve
 from motes.control.spline import Spline
-from motes.philox import address
+from motes.philox import address, birth_number
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,20 @@ class Clock:
             times = np.clip(self._when(k), begin, end)
             result.append(Source(self._number, k.astype(np.uint64), times))
         return result
+
+    def numbers(self, ids: NDArray[np.uint64], time: float) -> NDArray[np.int64]:
+        """Which births particles are (2, n): number of the stream and k, -1 for other emitters'.
+
+        The streams are the bursts, in order of time, and then the births of the rate.
+        """
+        found: NDArray[np.int64] = np.full((2, ids.size), -1)
+        streams = [(number, count) for _, count, number in self._bursts]
+        streams.append((self._number, int(self._integral(time)) + 1))
+        for k, (number, count) in enumerate(streams):
+            births = birth_number(number, ids)
+            own = (births >= 1) & (births <= count)
+            found[0, own], found[1, own] = k, births[own].astype(np.int64)
+        return found
 
     def expected(self, begin: float, end: float) -> float:
         """Number of births between two times, before it is made."""

@@ -116,8 +116,13 @@ def _printable(text: str) -> str:
 
 
 def likely(word: str, menu: Iterable[str]) -> str:
-    """A hint such as ` Did you mean "rate"?`, or nothing when no entry of the menu is close."""
+    """A hint such as ` Did you mean "rate"?`, or nothing when no entry of the menu is close.
+
+    An entry that goes on where the word stops is closer than any other.
+    """
     if len(word) > LONGEST_WORD:
         return ""
-    close = difflib.get_close_matches(word, list(menu), 1, 0.6)
+    entries = list(menu)
+    longer = [entry for entry in entries if len(word) > 1 and entry.startswith(word)]
+    close = sorted(longer, key=len) or difflib.get_close_matches(word, entries, 1, 0.6)
     return f' Did you mean "{close[0]}"?' if close else ""

@@ -11,6 +11,7 @@ takes some thirty times as long and is only loaded when it is needed.
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import hashlib
 import os
@@ -125,6 +126,29 @@ class Kernel:
 
         return bound
 
+    def each(self, head: Sequence[Any], calls: Calls) -> None:
+        """Call with `(*head, *tail)` for every tail, on the threads, which take the next one each
+        without asking Python; no two calls may write one element."""
+        from motes.machine.door import spread
+
+        tails = calls.tails
+        if len(tails) < 2:
+            for tail in tails:
+                self(*head, *tail)
+            return
+        key: list[Any] = []
+        numbers: list[Any] = []
+        for argument in head:
+            spread(argument, key, numbers)
+        last, lasts = calls.spread()
+        whole = (*key, *last)
+        door = self._doors.get(whole) or self._open(whole, (*head, *tails[0]))
+        run = None if door is self else door.each(numbers, lasts)
+        if run is None:
+            share(lambda k: self(*head, *tails[k]), len(tails))
+        else:
+            _share_out(run, len(tails))
+
     def _open(self, key: tuple[Any, ...], arguments: Sequence[Any]) -> Any:
         """The door for arguments of these types; the kernel itself where Numba must compile it."""
         from motes.machine.door import kind_of
@@ -163,6 +187,41 @@ class Kernel:
 def bound(kernel: Callable[..., Any], *arguments: Any) -> Callable[..., Any]:
     """`kernel` with its first arguments given; many calls then take them apart only once."""
     return kernel.bind(*arguments) if isinstance(kernel, Kernel) else partial(kernel, *arguments)
+
+
+class Calls:
+    """The last arguments of many calls of a kernel, of the same types in all of them."""
+
+    def __init__(self, tails: Sequence[Sequence[Any]]) -> None:
+        self.tails = tails
+        self._spread: tuple[list[Any], list[list[Any]]] | None = None
+
+    def spread(self) -> tuple[list[Any], list[list[Any]]]:
+        """What the arguments' types follow from, and their numbers for every call."""
+        from motes.machine.door import spread
+
+        if self._spread is None:
+            first: list[Any] = []
+            lasts: list[list[Any]] = []
+            for tail in self.tails:
+                key: list[Any] = []
+                lasts.append([])
+                for argument in tail:
+                    spread(argument, key, lasts[-1])
+                first = first or key
+                if key != first:
+                    raise TypeError("all calls must have arguments of the same types")
+            self._spread = first, lasts
+        return self._spread
+
+
+def each(kernel: Any, head: Sequence[Any], tails: Calls | Sequence[Sequence[Any]]) -> None:
+    """Call a kernel that returns nothing with `(*head, *tail)` for every tail, on the threads."""
+    calls = tails if isinstance(tails, Calls) else Calls(tails)
+    if isinstance(kernel, Kernel):
+        kernel.each(head, calls)
+    else:
+        share(lambda k: kernel(*head, *calls.tails[k]), len(calls.tails))
 
 
 # ---------------------------------------------------------------------------- kernel cache
@@ -315,6 +374,35 @@ def share(task: Callable[[int], Any], count: int) -> None:
     except BaseException:
         for _ in numbers:
             pass
+        wait(helpers)
+        raise
+
+
+AT_ONCE = 16
+"""Calls that a thread does before it looks whether it was interrupted."""
+
+
+def _share_out(run: Callable[[Any, int], None], count: int) -> None:
+    """Run calls that are taken from a counter, on the threads."""
+    global _pool
+    counter = ctypes.c_int64(0)
+    address = ctypes.addressof(counter)
+
+    def work() -> None:
+        while counter.value < count:
+            run(address, AT_ONCE)
+
+    helpers = []
+    if count > 1 and threads() > 1:
+        if _pool is None:
+            _pool = ThreadPoolExecutor(threads(), "motes")
+        helpers = [_pool.submit(work) for _ in range(min(threads(), count) - 1)]
+    try:
+        work()
+        for helper in helpers:
+            helper.result()
+    except BaseException:
+        counter.value = count
         wait(helpers)
         raise
 

@@ -15,6 +15,7 @@ from hashlib import blake2b
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motes.jit import EXACT, jit
 from motes.kernel import cos, log, sin
@@ -122,6 +123,21 @@ def hash_id(address: Any, k: Any) -> Any:
     """
     x = address ^ _mixed(k * np.uint64(0x9E3779B97F4A7C15) + np.uint64(1))
     return _mixed(x)
+
+
+def birth_number(address: int, ids: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """The k of `hash_id(address, k)`: its inverse, a large number where ids are of others."""
+    with np.errstate(over="ignore"):
+        x = _unmixed(_unmixed(ids) ^ np.uint64(address)) - np.uint64(1)
+        return np.asarray(x * np.uint64(pow(0x9E3779B97F4A7C15, -1, 1 << 64)))
+
+
+def _unmixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Inverse of `_mixed`: its steps backwards, each shift as often as it takes to pass 64 bits."""
+    for shift, factor in ((31, 0x94D049BB133111EB), (27, 0xBF58476D1CE4E5B9), (30, 1)):
+        x = x ^ (x >> np.uint64(shift))
+        x = (x ^ (x >> np.uint64(2 * shift))) * np.uint64(pow(factor, -1, 1 << 64))
+    return x
 
 
 @jit(flags=EXACT, inline=True)

@@ -54,6 +54,9 @@ class Made:
     frames: Path
     """Folder of the kept frames."""
 
+    captures: int = 0
+    """How many were caught by hunters."""
+
     def paths(self) -> list[Path]:
         """All files and folders, the film first."""
         return [path for path in (self.film, self.sheet, self.frames) if path is not None]
@@ -94,10 +97,10 @@ def film(
             if draw:
                 path = Path(folder) / f"{name}.{form}"
                 sheet = _draw(frames, numbers, scene, path, follower, report, rehearsal)
-                return Made(path, sheet, store.folder)
+                return Made(path, sheet, store.folder, len(simulation.captures))
             for _ in frames:
                 report.finished()
-    return Made(None, None, store.folder)
+    return Made(None, None, store.folder, len(simulation.captures))
 
 
 def redraw(
@@ -175,13 +178,18 @@ def _kept(
     report: Report,
 ) -> Iterator[Frame]:
     """Frames of a simulation, each on its way to the store before anybody draws it."""
-    frames = simulation.frames(first=numbers[0], last=numbers[-1])
+    frames, told = simulation.frames(first=numbers[0], last=numbers[-1]), 0
     interacts = bool(store.manifest.scene.get("interact"))
     for frame in report.simulated(frames, simulation):
         follower.add(store.write, frame)
         if interacts:
             # Of the last whole step before the frame, whose time they state.
-            store.note(frame.index, simulation.measure())
+            captures = simulation.captures
+            if frame.index == numbers[0] > 1:  # The frames before have told of theirs.
+                before = frame.time - 1 / simulation.scene.film.fps
+                told = sum(1 for one in captures if one["time"] <= before * (1 + 1e-12))
+            store.note(frame.index, simulation.measure(), captures[told:])
+            told = len(captures)
         yield frame
 
 

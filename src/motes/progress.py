@@ -31,6 +31,9 @@ class Progress:
     particle_steps: int = 0
     """Steps of integration so far, summed over the particles."""
 
+    captures: int = 0
+    """Prey that hunters have caught so far."""
+
     simulating: float = 0.0
     """Time spent on them [s]."""
 
@@ -89,6 +92,7 @@ class Report:
             self._tell(
                 particles=frame.count,
                 particle_steps=simulation.work,
+                captures=len(simulation.captures),
                 simulating=self._now.simulating + time.perf_counter() - begun,
                 compiling="",
             )

@@ -82,6 +82,29 @@ def weight(a: Rows, linear: Rows | None = None) -> Weight:
     return value
 
 
+def coloured_weights(*parts: Rows) -> Callable[[Tree], tuple[tuple[float, ...], ...]]:
+    """Elementary weights of an additive method, whose parts of f have a matrix each.
+
+    Every vertex but the root belongs to one part: one weight for each way to choose (Kennedy and
+    Carpenter 2003, section 2.1, with weights b that all parts share).
+    """
+    stages = len(parts[0])
+
+    @cache
+    def values(tree: Tree) -> tuple[tuple[float, ...], ...]:
+        found = {(1.0,) * stages}
+        for branch in tree:
+            moved = [
+                [sum(x * y for x, y in zip(row, below, strict=False)) for row in a]
+                for below in values(branch)
+                for a in parts
+            ]
+            found = {tuple(x * y for x, y in zip(f, m, strict=True)) for f in found for m in moved}
+        return tuple(found)
+
+    return values
+
+
 def nystrom_weight(c: Sequence[float], a: Rows) -> Weight:
     """Elementary weights of a Nystrom method for x'' = f(x), for `special` trees.
 

@@ -213,7 +213,7 @@ class Simulation:
             raise ValueError(f"position must be (n, 3), not {x.shape}")
         v = np.broadcast_to(np.asarray(velocity, float), x.shape)
         rows.append(x.T, v.T, self.time, np.uint64(channel(f"{system}.place")))
-        wrapped(rows.position[:, : rows.count], self._periodic)
+        wrapped(rows.position, self._periodic, rows.count)
 
     def step(self) -> None:
         """Take one step."""
@@ -267,7 +267,7 @@ class Simulation:
             group.step(state.systems, interval, memory)
         if self._periodic.size.any():
             for particles in state.systems.values():
-                wrapped(particles.position[:, : particles.count], self._periodic)
+                wrapped(particles.position, self._periodic, particles.count)
         state.number += 1
 
     def _steps_before(self, time: float) -> int:

@@ -113,11 +113,7 @@ class Particles:
     def reorder(self, order: NDArray[np.int32]) -> None:
         """Move rows: row k becomes what row `order[k]` was, for the first of the rows."""
         arrays = self.arrays()
-
-        def move(k: int) -> None:
-            arrays[k][: order.size] = arrays[k][order]
-
-        share(move, len(arrays))
+        share(lambda k: _move(arrays[k], order, np.empty(order.size, arrays[k].dtype)), len(arrays))
 
     def first_not_finite(self) -> int | None:
         """The first row whose position or velocity is infinite or not a number, or None."""
@@ -188,6 +184,14 @@ def _name(address, first, ids):  # type: ignore[no-untyped-def]
     """Ids of births from a number on."""
     for i in range(ids.size):
         ids[i] = hash_id(address, np.uint64(first + i))
+
+
+@jit
+def _move(array, order, room):  # type: ignore[no-untyped-def]
+    """Give the first elements of an array another order, by way of a room as long."""
+    for i in range(order.size):
+        room[i] = array[np.uint64(order[i])]
+    array[: order.size] = room
 
 
 @jit

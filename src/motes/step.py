@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.compile.straight import THREATENED
 from motes.compile.system import CompiledSystem
 from motes.emission import Clock, Source
 from motes.errors import SceneError
@@ -60,6 +59,7 @@ class Stepper:
         self.system, self.clocks, self.capacity = system, clocks, capacity
         self.seed = np.uint64(seed)
         self.flags: NDArray[np.uint8] = np.zeros(0, np.uint8)
+        self.held = NOTHING
         self._steps: dict[Any, tuple[tuple[Any, ...], Any]] = {}
         self.impacts = 0
 
@@ -95,6 +95,15 @@ class Stepper:
             "life or speed."
         )
 
+    def numbers(self, rows: Particles, alive: int, time: float) -> NDArray[np.int64]:
+        """Which births the rows that were alive are (2, alive): number of the stream, and k."""
+        found: NDArray[np.int64] = np.full((2, alive), -1)
+        for e, clock in enumerate(self.clocks):
+            stream, number = clock.numbers(rows.ids[:alive], time)
+            own = stream >= 0
+            found[0, own], found[1, own] = stream[own] * len(self.clocks) + e, number[own]
+        return found
+
     def births(self, rows: Particles, interval: Interval) -> int:
         """Append the newborns of the step, as they are at their own instants.
 
@@ -127,7 +136,7 @@ class Stepper:
     def _write(self, rows: Particles, name: str, source: Source, count: int) -> None:
         emitter = self.system.emitters[name]
         channels, first = self.system.trait_channels, rows.count
-        parts = _parts(count, 64)
+        parts = _parts(count, 16)
 
         def write(k: int) -> None:
             low, high = parts[k]
@@ -152,27 +161,24 @@ class Stepper:
     def _straight(
         self, kernel: Any, rows: Particles, first: int, last: int, interval: Interval
     ) -> NDArray[np.int64]:
-        flags = self._flags(rows)
-        parts = _parts(last - first, 1)
-        found = [NOTHING] * len(parts)
-
-        step = self._bound(kernel, rows)
+        step, parts = self._bound(kernel, rows), _parts(last - first, 1)
+        held = [NOTHING] * len(parts)
 
         def straight(k: int) -> None:
             low, high = first + parts[k][0], first + parts[k][1]
-            step(interval.begin, interval.end, low, high)
-            if self.system.surfaces is not None:
-                found[k] = _marked(flags, low, high)
+            count = step(interval.begin, interval.end, low, high)
+            if count:
+                held[k] = self.held[low : low + count]
 
         share(straight, len(parts))
-        return np.concatenate([NOTHING, *found])
+        return np.concatenate([NOTHING, *held])
 
     def _bound(self, kernel: Any, rows: Particles) -> Any:
         """A kernel with the arrays that it works on, which are the same from step to step until
         there are more rows than they hold."""
         arrays = (
             rows.position, rows.velocity, rows.birth, rows.columns, self._flags(rows),
-            self.system.K,
+            self.held, self.system.K,
         )  # fmt: skip
         known = self._steps.get(kernel)
         if known is None or not all(map(operator.is_, arrays, known[0])):
@@ -204,18 +210,18 @@ class Stepper:
         if self.system.surfaces is None:
             return False
         threats, flags, parts = self.system.staged("threats"), self._flags(rows), _parts(alive, 1)
-        found = [NOTHING] * len(parts)
+        held = [NOTHING] * len(parts)
 
         def threaten(k: int) -> None:
             low, high = parts[k]
-            threats(
-                rows.position, rows.velocity, ends, flags, self.system.K_staged, interval.begin,
-                interval.end, low, high,
+            count = threats(
+                rows.position, rows.velocity, flags, self.held, self.system.K_staged, ends,
+                interval.begin, interval.end, low, high,
             )  # fmt: skip
-            found[k] = _marked(flags, low, high)
+            held[k] = self.held[low : low + count]
 
         share(threaten, len(parts))
-        threatened = np.concatenate([NOTHING, *found])
+        threatened = np.concatenate([NOTHING, *held])
         parts = _parts(threatened.size, 64)
         counts = [(0, 0)] * len(parts)
 
@@ -264,6 +270,8 @@ class Stepper:
     def _flags(self, rows: Particles) -> NDArray[np.uint8]:
         if self.flags.size < rows.capacity + WORD:
             self.flags = np.zeros(rows.capacity + WORD, np.uint8)
+            if self.system.surfaces is not None:
+                self.held = np.empty(rows.capacity, np.int64)
         return self.flags
 
 
@@ -275,12 +283,3 @@ def _parts(rows: int, cost: int) -> list[tuple[int, int]]:
     """
     sixteenth = -(-rows * cost // 16)
     return blocks(rows, min(max(sixteenth, SMALLEST_BLOCK), LARGEST_BLOCK) // cost)
-
-
-def _marked(flags: NDArray[np.uint8], low: int, high: int) -> NDArray[np.int64]:
-    """Rows from `low` to `high` that may meet a solid: few, as a rule."""
-    words = np.flatnonzero(flags[low : low - (low - high) // WORD * WORD].view(np.uint64))
-    near = (low + words[:, np.newaxis] * WORD + np.arange(WORD)).ravel()
-    near = near[flags[near] & THREATENED != 0]
-    marked: NDArray[np.int64] = near[: np.searchsorted(near, high)]
-    return marked

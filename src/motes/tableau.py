@@ -142,13 +142,32 @@ class Explicit(_RungeKutta):
 class Implicit(_RungeKutta):
     """Implicit Runge-Kutta method: a full matrix a, or a lower one, which is solved row by row.
 
-    Raises TableauError as `Explicit` does.
+    With `a_explicit`, y' = f + g can be split: g takes a, and f the explicit rows, with the same b
+    and c. Raises TableauError as `Explicit` does; a split method must have its order for every
+    way to share the vertices of a tree between f and g.
     """
 
+    a_explicit: tuple[Numbers, ...] = ()
     implicit: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         self._check()
+        if self.a_explicit:
+            self._check_split()
+
+    def _check_split(self) -> None:
+        if any(len(row) != i for i, row in enumerate(self.a_explicit)):
+            raise TableauError("row i of an explicit part has i numbers")
+        _check_sums(self.c, self.a_explicit)
+        weights = rooted_trees.coloured_weights(self.a, self.a_explicit)
+        parts = [("split: ", self.order, self.b)]
+        if self.b_low is not None:
+            parts.append(("split, embedded method: ", self.low_order, self.b_low))
+        for what, order, b in parts:
+            for tree in rooted_trees.up_to(order):
+                n, density = rooted_trees.vertices(tree), rooted_trees.density(tree)
+                for weight in weights(tree):
+                    _check(what, order, n, b, weight, 1 / density)
 
     @property
     def diagonal(self) -> bool:

@@ -163,3 +163,40 @@ def test_a_rehearsal_that_cannot_begin_is_no_fault(monkeypatch: pytest.MonkeyPat
     with Rehearsal(loads(SCENE)) as rehearsal:
         rehearsal.begin()
         rehearsal.wait()
+
+
+HUNT = """
+title = "Hunt"
+duration = 0.5
+step = 0.05
+integrator = "semi_implicit_euler"
+film = { size = [64, 36] }
+[[interact]]
+type = "capture"
+hunters = ["cat"]
+radius = 0.25
+[[system]]
+name = "cat"
+emit = [{ type = "point", burst = [{ count = 1 }], position = [-0.5, 0, 0], velocity = [4, 0, 0] }]
+force = [{ type = "cruise", speed = 4 }]
+[[system]]
+name = "mice"
+emit = [{ type = "line", burst = [{ count = 9 }], length = 3.2, position = [1.6, 0.1, 0] }]
+force = [{ type = "cruise", speed = 0 }]
+"""
+
+
+def test_captures_are_told(tmp_path: Path) -> None:
+    """A run says how many were caught, `motes info` when; parts of a film tell each of its own."""
+    (tmp_path / "hunt.toml").write_text(HUNT)
+    done = run("run", "hunt.toml", "-o", "whole", "--no-film", cwd=tmp_path)
+    told = json.loads(run("info", "whole", "--json", cwd=tmp_path).stdout)["captures"]
+    assert len(told) > 2
+    assert f"{len(told)} caught" in done.stderr
+    assert all(abs(one["place"][0] - (4 * one["time"] - 0.5)) < 0.25 + 4 * 0.05 for one in told)
+    assert len({one["prey"] for one in told}) == len(told)
+    shown = run("info", "whole", cwd=tmp_path).stdout
+    assert f"{len(told)}, the first at {told[0]['time']:.3g} s" in " ".join(shown.split())
+    for part in ("1-6", "7-12"):
+        run("run", "hunt.toml", "-o", "parts", "--no-film", "--frames", part, cwd=tmp_path)
+    assert json.loads(run("info", "parts", "--json", cwd=tmp_path).stdout)["captures"] == told

@@ -168,7 +168,7 @@ def test_an_address_may_be_shortened_while_it_is_unique() -> None:
     ("address", "line"),
     [
         ("sparks.emit.rat", 'no value has the address "sparks.emit.rat". Did you mean '
-         '"sparks.cone.rate"? `Scene.addresses` lists them.'),
+         '"sparks.emit.rate"? `Scene.addresses` lists them.'),
         ("spark.rate", 'no value has the address "spark.rate". Did you mean "sparks.cone.rate"? '
          "`Scene.addresses` lists them."),
         ("position", '"position" stands for several values: camera.position, sparks.cone.position. '

@@ -6,6 +6,7 @@ import json
 import re
 import tomllib
 from collections.abc import Iterator
+from itertools import islice
 from typing import Any
 
 import pytest
@@ -44,8 +45,10 @@ def planted(text: str) -> Iterator[tuple[int, str, str]]:
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_a_renamed_key_is_reported_at_its_line(name: str) -> None:
+    """Every key of the rich scene, and every fifth one of each scene of the gallery."""
+    first, stride = (0, 1) if name == "rich" else (len(name) % 5, 5)
     count = 0
-    for line, key, text in planted(TEXTS[name]):
+    for line, key, text in islice(planted(TEXTS[name]), first, None, stride):
         if "not TOML" in str(problems(text)):
             continue  # Tables of a list that has lost its header.
         found = {p.line for p in problems(text)}
@@ -55,7 +58,7 @@ def test_a_renamed_key_is_reported_at_its_line(name: str) -> None:
             line = max(i + 1 for i, other in enumerate(before) if other.startswith("["))
         assert line in found, (line, key, problems(text))
         count += 1
-    assert count > 20
+    assert count > (100 if name == "rich" else 3)
 
 
 WRONG = ("nan", "1979-05-27", "{ nonsense = 1 }", '"#12"', "[[[1]]]")
@@ -69,13 +72,15 @@ WRONG = ("nan", "1979-05-27", "{ nonsense = 1 }", '"#12"', "[[[1]]]")
     ],
 )
 def test_a_wrong_value_is_reported_at_its_line(name: str, first: int) -> None:
-    """Every key of the rich scene gets every wrong value, every key of the gallery one of them."""
+    """Every key of the rich scene gets every wrong value, a third of the gallery's one of them."""
     lines = TEXTS[name].split("\n")
     count = 0
     for i, line in enumerate(lines):
         wrong = WRONG[(first + i * (name != "rich")) % len(WRONG)]
         match = re.match(r"""['"]?([\w.]+)['"]? = """, line)
         if match is None or (match[1] in ("title", "about") and wrong.startswith('"')):
+            continue
+        if name != "rich" and (first + i) % 3:
             continue
         text = "\n".join([*lines[:i], match[0] + wrong, *lines[i + 1 :]])
         try:
@@ -84,7 +89,7 @@ def test_a_wrong_value_is_reported_at_its_line(name: str, first: int) -> None:
             continue  # The first line of a value of several.
         assert i + 1 in {p.line for p in problems(text)}
         count += 1
-    assert count > 10
+    assert count > (50 if name == "rich" else 3)
 
 
 def test_all_faults_are_reported_at_once() -> None:

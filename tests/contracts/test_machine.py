@@ -19,6 +19,8 @@ from hypothesis import strategies as st
 import motes.jit
 from motes.errors import SceneError
 from motes.jit import STRICT, Kernel, jit
+from motes.machine.lanes import bits as marks_of
+from motes.machine.lanes import lowest, put, settled, take
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning"),
@@ -375,6 +377,74 @@ def test_kernels_call_kernels():
     assert compiled(outer)(x, np.float32(0.5)) == expected(x, np.float32(0.5))
 
 
+TABLE = np.array([[0.5, -1.25], [3.0, 1e-300]])
+FLAGS = np.array([True, False])
+
+
+def test_arrays_of_a_module_are_part_of_the_code_and_only_read():
+    def looked_up(i, j):
+        return TABLE[i, j] * (2.0 if FLAGS[j] else 3.0), TABLE[1:].size
+
+    def overwritten(x):
+        TABLE[0, 0] = x
+
+    for place in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        same(looked_up, *place)
+    with pytest.raises(SceneError, match="only read"):
+        compiled(overwritten)(1.0)
+
+
+def test_a_function_may_return_an_array_of_its_own():
+    """Each call has one of its own, which lives as long as its caller's numbers."""
+
+    def shifted(x, h):
+        result = np.empty(3)
+        for i in range(3):
+            result[i] = x[i] + h
+        return result, h
+
+    def twice(x):
+        return shifted(shifted(x, 10.0)[0], 100.0)[0]
+
+    def outer(x, out):
+        a, b = twice(x), shifted(x, 1.0)[0]
+        for i in range(3):
+            out[0, i], out[1, i] = a[i], b[i]
+
+    same(outer, np.array([1.0, 2.0, 3.0]), np.zeros((2, 3)))
+
+    def looped(x):
+        for _ in range(3):
+            x = twice(x)
+        return x[0]
+
+    with pytest.raises(SceneError, match="inside a loop"):
+        compiled(looped)(np.zeros(3))
+
+
+def test_arrays_in_other_shapes():
+    def turned(x, n):
+        y, z = x.reshape((n, -1)), x.reshape(2, 3).ravel()
+        y[0, 1] += z[5]
+        return y[1, 0], y.shape[1], z.size
+
+    same(turned, np.arange(6.0), 3)
+    with pytest.raises(SceneError, match="follow each other"):
+        compiled(turned)(np.arange(12.0)[::2], 3)
+
+
+@pytest.mark.parametrize("x", [0.0, 0.3, 7.0, 1e200, math.inf])
+def test_powers_of_halves_and_of_any_number(x):
+    def powers(x, p):
+        return x**1.5, x**-0.5, x**0.5, x**2.5, x**p, math.exp(-x), math.sin(x % 1.0)
+
+    with np.errstate(all="ignore"):
+        x, p = np.float64(x), np.float64(0.7)
+        expected = x**1.5, x**-0.5, x**0.5, x**2.5, x**p, np.exp(-x), np.sin(x % 1.0)
+        expected = tuple(map(float, expected))
+    assert compiled(powers)(x, p) == pytest.approx(expected, rel=1e-15, nan_ok=True)
+
+
 # ---------------------------------------------------------------------------- faults, cache
 
 
@@ -441,3 +511,65 @@ def test_a_film_needs_no_numba(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.stdout.strip() == "False", done.stderr
+
+
+# ---------------------------------------------------------------------------- lanes
+
+
+def test_lanes_are_numbers_side_by_side() -> None:
+    """A function of single numbers works on eight at once: arithmetic, choices, ways, bits."""
+
+    def law(x: Any, y: Any) -> Any:
+        far = np.sqrt(x * x + y * y)
+        w = 1.0 - far if far < 1.0 else -0.5 * y
+        if (x > y) & (far >= 0.25) and not far > 3.0:
+            w = abs(w) + max(x, 0.25)
+            y = -y
+        else:
+            w = min(w, x / (far + 1.0))
+        return w + y, far > 1.0
+
+    inner = jit(law, flags=STRICT, inline=True)
+
+    def eight(x: Any, y: Any, out: Any, marks: Any) -> None:
+        for i in range(0, x.size, 8):
+            value, far = inner(take(x, i, 8), y[i])
+            put(out, i, settled(value) + 1)
+            whole = marks_of(far)
+            while whole != np.uint64(0):
+                marks[np.uint64(i) + lowest(whole)] = 1
+                whole &= whole - np.uint64(1)
+
+    def one(x: Any, y: Any, out: Any, marks: Any) -> None:
+        for i in range(x.size):
+            value, far = law(take(x, i, 1), y[i // 8 * 8])
+            put(out, i, settled(value) + x.dtype.type(1))
+            marks[i + int(lowest(1))] = marks_of(far)
+
+    rng = np.random.default_rng(1)
+    for real in (np.float32, np.float64):
+        x, y = rng.normal(size=(2, 64)).astype(real) * real(2)
+        found, expected = np.zeros((2, 64), real)
+        marks, told = np.zeros((2, 64), np.int32)
+        compiled(eight)(x, y, found, marks)
+        one(x, y, expected, told)
+        np.testing.assert_array_equal(found, expected)
+        np.testing.assert_array_equal(marks, told)
+
+
+def test_lanes_go_the_same_way() -> None:
+    """A loop that would end for some lanes only, and a write for some, are refused."""
+
+    def ends(x: Any) -> None:
+        a = take(x, 0, 8)
+        while a > 0:
+            a = a - 1
+        put(x, 0, a)
+
+    def writes(x: Any) -> None:
+        if take(x, 0, 8) > 0:
+            x[0] = 1.0
+
+    for function in (ends, writes):
+        with pytest.raises(SceneError, match="lanes"):
+            compiled(function)(np.ones(8))

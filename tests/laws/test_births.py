@@ -51,6 +51,23 @@ def test_births_spread_along_the_path_of_a_moving_emitter() -> None:
     assert np.sort(sim["s"].position[:, 0]) == pytest.approx(4 * np.arange(1, 41) / 40, rel=1e-9)
 
 
+def test_a_curve_that_does_not_move_gives_what_a_constant_gives() -> None:
+    """An emitter that stands still is placed once a step, another one at each birth."""
+    cone = {"rate": 500.0, "direction": (1.0, 2.0, -0.5), "radius": 0.3, "angle": 40.0}
+    still = simulation(
+        [motes.emit.Cone(**cone, position=(1.0, 2.0, 3.0))], size={"mean": 2.0, "spread": 1.0}
+    )
+    path = {"over": "time", "keys": [[0, [1, 2, 3]], [10, [1, 2, 3]]]}
+    moving = simulation([motes.emit.Cone(**cone, position=path)], size={"mean": 2.0, "spread": 1.0})
+    for sim in (still, moving):
+        sim.run(until=0.5)
+    assert still.count == 250
+    for column in ("id", "birth", "size"):
+        assert np.array_equal(getattr(still["s"], column), getattr(moving["s"], column))
+    assert still["s"].position == pytest.approx(moving["s"].position, rel=1e-14)
+    assert still["s"].velocity == pytest.approx(moving["s"].velocity, rel=1e-14)
+
+
 def test_newborns_inherit_the_emitters_velocity() -> None:
     """v = share of the derivative of the path."""
     path = {"over": "time", "keys": [[0, [0, 0, 0]], [10, [0, 30, 0]]]}

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.plain import crowd
 
 import motes
 from motes.interact.crowd.avoid import Rules, Walls, avoid
@@ -64,6 +65,33 @@ def test_half_of_the_gap() -> None:
     assert (nx, ny, c) == pytest.approx((-1.0, 0.0, -2.0))
     assert 1.0 - 2 * -c * 0.1 == pytest.approx(0.6)
     assert contact(0.5, 0.0, 0.6, 0.1)[2] == 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_crowd_does_what_the_definition_says(seed: int) -> None:
+    """The kernels against all pairs and all candidates for the best, written down plainly."""
+    rng = np.random.default_rng(seed)
+    side = np.arange(4) * 1.6
+    x = np.stack(np.meshgrid(side, side)).reshape(2, -1) + rng.uniform(-0.5, 0.5, (2, 16))
+    v, wanted = rng.uniform(-1, 1, (2, 2, 16))
+    size, law = rng.uniform(0.15, 0.25, 16), rules(reach=4.0, margin=0.08, horizon=1.5)
+    found = avoid(x, v, wanted, size, no_walls(16), law, 15)
+    compared = 0
+    for i in range(16):
+        others = [j for j in range(16) if j != i and np.hypot(*(x[:, j] - x[:, i])) <= 4.0]
+        planes = []
+        for j in others:
+            p = x[:, j] - x[:, i]
+            n = -p / np.hypot(*p)
+            gap = np.hypot(*p) - size[i] - size[j]
+            planes.append((n, min(-0.5 * gap / law.step, 0.0)))  # At most half of the gap.
+            both = size[i] + size[j] + law.margin
+            planes.append(crowd.half_plane(p, v[:, i], v[:, j], both, law.horizon))
+        expected = crowd.best(planes, wanted[:, i], law.top_speed)
+        if expected is not None:
+            compared += 1
+            assert found[:, i] == pytest.approx(expected, abs=1e-6)
+    assert compared >= 12
 
 
 def test_a_thousand_on_a_circle_swap_places() -> None:
@@ -216,3 +244,59 @@ def test_a_crowd_needs_kicks_and_drifts() -> None:
     people = walkers("people", (0, 0, 0), (5, 5, 0), (9, 0, 0), (1, 1, 0), burst=[{"count": 2}])
     with pytest.raises(motes.SceneError, match="semi_implicit_euler"):
         motes.Simulation(motes.Scene(systems=[people], interact=[motes.interact.Crowd()]))
+
+
+def test_parties_stay_together() -> None:
+    """Threes that walk at paces of their own, through others, stay within two steps; without the
+    law they lose each other. A party is three births after one another, wherever rows have gone."""
+
+    def spread(*laws: Any) -> tuple[float, float]:
+        emitter = motes.emit.Parties(burst=[{"count": 60}], size=(6, 12, 0), position=(-9, 0, 0))
+        forces = [
+            motes.force.Goal(place=(99, 0, 0), along=(1, 0, 0), speed={"mean": 1.2, "spread": 0.4}),
+            motes.force.Wander(strength=0.4, along=(1, 1, 0)),
+        ]
+        people = motes.System("people", emit=[emitter], force=forces, size=0.4)
+        sim = motes.Simulation(motes.Scene(
+            systems=[people], interact=[motes.interact.Crowd(), *laws], step=0.1, seed=3,
+            integrator="semi_implicit_euler", precision="double",
+        ))  # fmt: skip
+        sim.run(steps=1)
+        rows = sim._state.systems["people"]
+        stream, number = sim._steppers["people"].numbers(rows, rows.count, sim.time)
+        assert (stream == stream[0]).all()
+        assert (np.sort(number) == np.arange(1, 61)).all()
+        ids, party = sim["people"].id.copy(), (number - 1) // 3
+
+        def widest() -> float:
+            which = dict(zip(ids, party, strict=True))
+            now = np.array([which[i] for i in sim["people"].id])
+            x = sim["people"].position
+            return float(np.median([np.ptp(x[now == k], axis=0).max() for k in range(20)]))
+
+        first = widest()
+        sim.run(until=16.0)
+        return first, widest()
+
+    first, apart = spread()
+    same, together = spread(motes.interact.Party(members=3, strength=2.0, room=0.8))
+    assert first < 1.5
+    assert same < 1.5
+    assert apart > 5.0
+    assert together < 2.2
+
+
+def test_the_pull_of_a_party() -> None:
+    """Two, 4 m apart, with room 0.8 m: the whole strength; 2.4 m apart: half of it."""
+    for gap, share in ((4.0, 1.0), (2.4, 0.5), (1.6, 0.0)):
+        emitter = motes.emit.Parties(
+            burst=[{"count": 2}], members=2, size=(0, 0, 0), spacing=(gap, 0, 0), scatter=0.0
+        )
+        pair = motes.System("pair", emit=[emitter], force=[motes.force.Cruise(speed=0.0)])
+        sim = motes.Simulation(motes.Scene(
+            systems=[pair], interact=[motes.interact.Party(members=2, strength=3.0, room=0.8)],
+            step=0.01, integrator="semi_implicit_euler", precision="double",
+        ))  # fmt: skip
+        sim.run(steps=1)
+        x, v = sim["pair"].position[:, 0], sim["pair"].velocity[:, 0]
+        assert v * -np.sign(x) == pytest.approx(0.01 * 3.0 * share, abs=1e-9)

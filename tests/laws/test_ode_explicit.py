@@ -81,8 +81,11 @@ def test_tolerance_bounds_the_error(method):
 
 
 def test_compiled_and_plain_solves_agree():
-    """One loop serves both: the same steps, but for the rounding of fused multiply-add."""
-    for options in ({"method": "rk4", "step": 0.1}, {"method": "dop853"}):
+    """One loop serves both: the same steps, but for the rounding of fused multiply-add.
+
+    A first step so short that its error is rounding alone would give that rounding a say.
+    """
+    for options in ({"method": "rk4", "step": 0.1}, {"method": "dop853", "first_step": 0.1}):
         plain = ode.solve(circle, [1.0, 0.0], (0, 5), **options)
         compiled = ode.solve(compiled_circle, [1.0, 0.0], (0, 5), **options)
         assert compiled.evaluations == plain.evaluations
@@ -143,6 +146,49 @@ def test_events_are_found_between_steps_in_order_and_direction():
     assert both.y[:, 1] == pytest.approx(0, abs=1e-12)
 
 
+@pytest.mark.parametrize("around", [lambda f: f, njit], ids=["plain", "compiled"])
+def test_zeros_that_come_back_within_a_step_are_not_missed(around):
+    """Two zeros in one step leave the signs at its ends alike: parts of the step are looked at."""
+
+    def still(t, y):
+        return (0.0 * y[0],)
+
+    def twice(t, y):
+        return (t - 0.3) * (t - 0.6)
+
+    f, g = around(still), around(twice)
+    events = [g, ode.Event(g, direction=1), ode.Event(g, direction=1, terminal=True)]
+    r = ode.solve(f, [1.0], (0, 3), method="rk4", step=1, events=events)
+    assert r.events[0].t == pytest.approx([0.3, 0.6], abs=1e-15)
+    assert r.events[1].t == pytest.approx([0.6], abs=1e-15)
+    assert r.t == pytest.approx([0, 0.6], abs=1e-15)
+    assert r.message == "stopped by event 2 at t = 0.6"
+
+
+def test_steps_follow_proportional_and_integral_control():
+    """Each step of bosh3 on y' = -y + t follows from the errors of the two before it."""
+
+    def f(t, y):
+        return (-y[0] + t,)
+
+    table, tol = methods()["bosh3"], 1e-6
+    r = ode.solve(f, [1.0], (0, 3), method="bosh3", rtol=tol, atol=tol, largest_step=1.0)
+    assert r.rejected == 0
+    errors = []
+    for t, y, h in zip(r.t, r.y[:, 0], np.diff(r.t), strict=False):
+        k = []
+        for c, row in zip(table.c, table.a, strict=True):
+            k.append(f(t + c * h, [y + h * np.dot(row, k)])[0] if k else f(t, [y])[0])
+        e = h * (np.dot(table.b, k) - np.dot(table.b_low, k))
+        after = y + h * np.dot(table.b, k)
+        errors.append(abs(e) / (tol + tol * max(abs(y), abs(after))))
+    assert max(errors) < 1
+    h = np.diff(r.t)
+    for n in range(2, len(h) - 2):
+        last, now = max(errors[n - 1], 1e-4) ** (0.15 / 3), errors[n] ** (0.9 / 3)
+        assert h[n + 1] == pytest.approx(h[n] * 0.87 * last / now, rel=1e-6)
+
+
 def test_a_compiled_solve_finds_the_same_events():
     event = njit(lambda t, y: y[1])
     r = ode.solve(compiled_circle, [1.0, 0.0], (0.1, 10.1), rtol=1e-10, events=[event])
@@ -154,6 +200,7 @@ def test_where_no_step_exists_the_message_says_why():
     r = ode.solve(lambda t, y: (1.0, y[1] ** 2), [0.0, 1.0], (0, 2), rtol=1e-8)
     assert not r.success
     assert "y[1]" in r.message
+    assert f"t = {r.t[-1]:.10g}" in r.message
     assert r.t[-1] == pytest.approx(1, abs=1e-6)
     r = ode.solve(lambda t, y: y**2, 1e200, (0, 1), method="euler", step=0.1)
     assert not r.success

@@ -10,7 +10,8 @@ from motes import ode
 from motes.integrate import methods
 
 IMPLICIT = [name for name, table in methods().items() if table.implicit]
-L_STABLE = ["backward_euler", "bdf2", "kencarp4", "radau5", "rodas4", "sdirk2"]
+PAIRS = ["kencarp3", "kencarp4"]
+L_STABLE = ["backward_euler", "bdf2", *PAIRS, "radau5", "rodas4", "sdirk2"]
 
 
 def driven(t, y):
@@ -21,7 +22,7 @@ def driven(t, y):
 def test_measured_order_is_declared_order(method):
     """Halving the step divides the error by 2^order."""
     order = methods()[method].order
-    n = {1: 200, 2: 60, 4: 20, 5: 12}[order]
+    n = {1: 200, 2: 60, 3: 30, 4: 20, 5: 12}[order]
     exact = ode.solve(driven, [1.0, 0.0], (0, 6), method="verner9", step=0.01).y[-1]
     errors = [
         np.linalg.norm(
@@ -36,7 +37,7 @@ def test_measured_order_is_declared_order(method):
 def test_dense_output_has_the_order_of_the_method(method):
     """Its largest error falls as h^order, as that of the steps does."""
     order = methods()[method].order
-    n = {1: 60, 2: 30, 4: 12, 5: 8}[order]
+    n = {1: 60, 2: 30, 3: 20, 4: 12, 5: 8}[order]
     times = np.linspace(0, 3, 31)
     exact = np.column_stack([np.cos(times), np.sin(times)])
     errors = []
@@ -168,3 +169,76 @@ def test_stability_on_the_axes():
         assert facts[name].imaginary == np.inf
     assert facts["dopri5"].embedded == 4
     assert facts["rk4"].embedded is None
+
+
+# ---------------------------------------------------------------------------- a stiff part alone
+
+
+def turning(t, y):
+    return -y[1] * (1 + 0.3 * y[0]), y[0]
+
+
+def dragging(t, y):
+    return -0.3 * y[0] ** 3, y[0] * 0.2 * np.sin(t) - 0.5 * y[1]
+
+
+def together(t, y):
+    f, g = turning(t, y), dragging(t, y)
+    return f[0] + g[0], f[1] + g[1]
+
+
+@pytest.mark.parametrize("method", PAIRS)
+@pytest.mark.parametrize("turned", [False, True], ids=["f explicit", "f implicit"])
+def test_a_pair_has_its_order_whichever_part_is_implicit(method, turned):
+    """Halving the step divides the error by 2^order, with both parts nonlinear or with time."""
+    order = methods()[method].order
+    f, g = (dragging, turning) if turned else (turning, dragging)
+    exact = ode.solve(together, [1.0, 0.3], (0, 4), method="verner9", step=0.01).y[-1]
+    errors = [
+        np.linalg.norm(
+            ode.solve(f, [1.0, 0.3], (0, 4), method=method, step=4 / m, stiff=g).y[-1] - exact
+        )
+        for m in (80, 160)
+    ]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.15)
+
+
+@pytest.mark.parametrize("method", PAIRS)
+def test_a_stiff_part_bounds_no_step(method):
+    """x' = cos t - k (x - sin t), x = sin t: the step follows the slow motion, not k.
+
+    Order reduction leaves an error of h^2 of the explicit part, whatever k.
+    """
+    k = 1e6
+
+    def slow(t, x):
+        return np.cos(t) + 0 * x
+
+    def drag(t, x):
+        return -k * (x - np.sin(t))
+
+    r = ode.solve(slow, 1.0, (0, 20), method=method, rtol=1e-5, atol=1e-6, stiff=drag)
+    assert r.success
+    assert r.y[-1] == pytest.approx(np.sin(20), abs=30e-5)
+    assert r.steps < 20 * k / 2.8 / 1000  # Explicit methods need a thousand times as many.
+    fixed = ode.solve(slow, 1.0, (0, 20), method=method, step=0.2, stiff=drag)
+    assert fixed.y[-1] == pytest.approx(np.sin(20), abs=0.2**2 / 4)
+    explicit = ode.solve(drag, 1.0, (0, 20), method=method, step=0.2, stiff=slow)
+    assert not explicit.success or abs(explicit.y[-1]) > 1e9
+
+
+def test_compiled_pairs_are_those_of_plain_functions():
+    """The same steps; evaluations count both parts, and `newton` serves the stiff one."""
+    for options in ({"step": 0.1}, {"rtol": 1e-7}, {"newton": ode.Newton(solver="krylov")}):
+        given = {"method": "kencarp4", "rtol": 1e-5, "stiff": dragging, **options}
+        plain = ode.solve(turning, [1.0, 0.3], (0, 4), **given)
+        given["stiff"] = njit(dragging)
+        fast = ode.solve(njit(turning), [1.0, 0.3], (0, 4), **given)
+        assert fast.evaluations == plain.evaluations
+        assert fast.y == pytest.approx(plain.y, abs=1e-7)
+        assert fast.evaluations > 6 * 2 * fast.steps
+
+
+def test_only_pairs_take_a_stiff_part():
+    with pytest.raises(ValueError, match='"radau5" takes y\' whole; kencarp3 and kencarp4 take'):
+        ode.solve(turning, [1.0, 0.0], (0, 1), method="radau5", stiff=dragging)

@@ -91,6 +91,20 @@ def test_symplectic_methods_bound_the_energy_and_others_drift():
         assert (grows > 5) == (method == "rk4")
 
 
+@pytest.mark.parametrize(
+    ("method", "bounded"),
+    [(name, True) for name, table in methods().items() if table.symplectic]
+    + [(name, False) for name in ("ralston", "midpoint", "rk4", "dopri5", "nystrom5", "sdirk2")],
+)
+def test_over_a_thousand_periods_symplectic_methods_alone_bound_the_energy(method, bounded):
+    """Twenty times as long makes no symplectic method's worst error worse, and every other's."""
+    h, period = 2 * np.pi / 100, 2 * np.pi
+    at = np.linspace(0, 1000 * period, 20_001)
+    r = ode.solve_newton(gravity, X0, V0, (0, at[-1]), method=method, step=h, at=at, dense=False)
+    error = np.abs(energy(r.x, r.v) / energy(r.x[0], r.v[0]) - 1)
+    assert (error.max() < 1.2 * error[:1000].max()) == bounded
+
+
 @pytest.mark.slow
 def test_energy_stays_bounded_for_a_hundred_thousand_periods():
     """Leapfrog's energy error after 1e5 periods is what it was after ten."""

@@ -12,7 +12,7 @@ from motes.errors import SceneError
 from motes.integrate import method, methods
 from motes.tableau import Explicit, Implicit, Splitting, TableauError
 
-NUMBERS = ("a", "b", "b_position", "c", "d", "drifts", "g", "kicks")
+NUMBERS = ("a", "a_explicit", "b", "b_position", "c", "d", "drifts", "g", "kicks")
 
 
 def test_number_of_rooted_trees():
@@ -61,6 +61,21 @@ def test_every_number_of_every_table_is_checked(name: str):
 def test_no_table_has_a_higher_order_than_it_declares(name: str):
     with pytest.raises(TableauError, match=f"declared order {methods()[name].order + 1}"):
         dataclasses.replace(methods()[name], order=methods()[name].order + 1)
+
+
+def test_both_parts_of_a_split_method_are_checked_together():
+    """An explicit part whose rows add up to c is refused where a condition with both fails."""
+    table = methods()["kencarp3"]
+    first, second, (x, y), last = table.a_explicit
+    with pytest.raises(TableauError, match="split: declared order 3, but an order-3 condition"):
+        dataclasses.replace(table, a_explicit=(first, second, (x + 0.001, y - 0.001), last))
+
+
+def test_weights_of_a_split_method_are_one_for_each_way_to_share_the_vertices():
+    weights = rooted_trees.coloured_weights(((), (2.0,)), ((), (3.0,)))
+    assert weights(()) == ((1.0, 1.0),)
+    assert set(weights(((),))) == {(0.0, 2.0), (0.0, 3.0)}
+    assert set(weights(((), ()))) == {(0.0, 4.0), (0.0, 6.0), (0.0, 9.0)}
 
 
 def test_a_wrong_table_says_what_is_wrong():

@@ -285,7 +285,7 @@ def find(kind: str, type: str) -> type[Component]:
         menu = catalog(kind)
         if type not in menu:
             hint = f"{likely(type, menu)} There are: {', '.join(menu)}."
-            raise SceneError(f'no {kinds(kind).noun} "{type}".{hint}')
+            raise SceneError(f'no {kinds(kind).noun} "{type}".{hint}', source="")
     return _registry.entries[kind][type]
 
 

@@ -51,6 +51,7 @@ def command(folder: Path, as_json: bool) -> None:
             str(number): {**to_json(m), "energy": m.energy, "virial_ratio": m.virial_ratio}
             for number, m in measures.items()
         }
+    facts["captures"] = captures = store.captures()
     if as_json:
         click.echo(json.dumps({**facts, "scene": manifest.scene}, indent=2, ensure_ascii=False))
         return
@@ -63,6 +64,9 @@ def command(folder: Path, as_json: bool) -> None:
     ]
     if measures:
         rows += _kept(list(measures.values()))
+    if captures:
+        begin, end = (f"{captures[k]['time']:.3g} s" for k in (0, -1))
+        rows.append(("captures", f"{len(captures)}, the first at {begin}, the last at {end}"))
     for name, columns in facts["systems"].items():
         rows.append((name, f"{_columns(columns)} in frame {numbers[-1]}"))
     text = click.HelpFormatter()

@@ -86,13 +86,15 @@ class _Lines:
 
 
 def work(progress: Progress) -> str:
-    """Frames, particles, speed: `12/144 frames, 50.2 k particles, 812 M particle-steps/s`."""
+    """How far it is: `12/144 frames, 50.2 k particles, 812 M particle-steps/s, 3 caught`."""
     if not progress.done:
         return ""
     text = f"{progress.done}/{progress.total} frames, {rounded(progress.particles)} particles"
     if progress.simulating > 0 and progress.particle_steps:
         rate = progress.particle_steps / progress.simulating
         text += f", {rounded(rate)} particle-steps/s"
+    if progress.captures:
+        text += f", {progress.captures} caught"
     return text
 
 

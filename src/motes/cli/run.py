@@ -74,6 +74,8 @@ def make(
 
         size_kept = open_frames(folder).size()
         click.echo(f"{rounded(size_kept)}B of frames", err=True)
+    if made.captures and not quiet:
+        click.echo(f"{made.captures} caught; `motes info {folder}` tells when", err=True)
     for path in made.paths():
         click.echo(path)
 

@@ -22,14 +22,14 @@ CUT = 1.0 - np.exp(-8.0)
 _log, _cos, _sin = (f.compiled("double") for f in (log, cos, sin))
 
 
-@jit(flags=EXACT)
+@jit(flags=EXACT, inline=True)
 def uniforms(seed: Any, id: Any, name: Any) -> Any:
     """Two uniform numbers in [0, 1) for a particle and a channel."""
     a, b, c, d = draw(seed, id, name, FIRST_TICK)
     return uniform_double(a, b), uniform_double(c, d)
 
 
-@jit(flags=EXACT)
+@jit(flags=EXACT, inline=True)
 def normals(seed: Any, id: Any, name: Any) -> Any:
     """Two normal numbers, their pair cut off at a radius of 4 (Box and Muller)."""
     u, v = uniforms(seed, id, name)
@@ -122,32 +122,45 @@ def write_emitter(text: Text, emitter: Component, address: str, channels: Channe
     write_draws(text, list(values.columns), channels)
 
 
-def births_kernel(emitter: dict[str, Any], traits: dict[str, Any], width: int, moves: bool) -> Any:
+def births_kernel(
+    emitter: dict[str, Any], traits: dict[str, Any], width: int, moves: bool, steady: bool
+) -> Any:
     """The kernel that writes newborns: row first + j is the `numbers[j]`-th birth, at `times[j]`.
 
     Rows get what the emitter and the system's traits give at the birth's own instant. `width` is
-    the number of trait columns; `moves` says whether particles have a velocity.
+    the number of trait columns; `moves` says whether particles have a velocity; `steady`, that
+    nothing of either varies in time, so that one look at the scene serves all.
     """
     scene, pose, newborn, drawn = (emitter[n] for n in ("scene", "pose", "newborn", "drawn"))
     trait_scene, trait_drawn = traits["scene"], traits["drawn"]
+    inherits = not steady  # From an emitter that stands still there is nothing to inherit.
+
+    @jit(flags=EXACT, inline=True)
+    def placed(K, t):  # type: ignore[no-untyped-def]
+        S = scene(K, t)
+        x, y, z, dx, dy, dz, inherit = pose(S)
+        return S, (x, y, z), frame(dx, dy, dz), inherit
 
     @jit(flags=EXACT)
     def births(  # type: ignore[no-untyped-def]
         position, velocity, birth, ids, columns, first, times, numbers, address, seed, K, channels,
         KT, trait_channels,
     ):  # fmt: skip
+        S, P, A, inherit = placed(K, 0.0)
+        ST = trait_scene(KT, 0.0)
         for j in range(times.size):
             i, t = first + j, times[j]
             id = hash_id(address, numbers[j])
-            S = scene(K, t)
+            if not steady:
+                S, P, A, inherit = placed(K, t)
+                ST = trait_scene(KT, t)
             C = drawn(K, S, seed, id, channels, t)
             x, y, z, vx, vy, vz, ex, ey, ez = newborn(S, C, t, numbers[j], seed, id, channels)
-            px, py, pz, dx, dy, dz, inherit = pose(S)
-            x, y, z = aimed(dx, dy, dz, x, y, z)
-            position[0, i], position[1, i], position[2, i] = px + x, py + y, pz + z
+            x, y, z = turned(A, x, y, z)
+            position[0, i], position[1, i], position[2, i] = P[0] + x, P[1] + y, P[2] + z
             if moves:
-                vx, vy, vz = aimed(dx, dy, dz, vx, vy, vz)
-                if inherit != 0.0:
+                vx, vy, vz = turned(A, vx, vy, vz)
+                if inherits and inherit != 0.0:
                     ax, ay, az, _, _, _, _ = pose(scene(K, t - MOMENT))
                     bx, by, bz, _, _, _, _ = pose(scene(K, t + MOMENT))
                     share = inherit / (2.0 * MOMENT)
@@ -158,7 +171,7 @@ def births_kernel(emitter: dict[str, Any], traits: dict[str, Any], width: int, m
                     )
                 velocity[0, i], velocity[1, i], velocity[2, i] = vx + ex, vy + ey, vz + ez
             birth[i], ids[i] = t, id
-            T = trait_drawn(KT, trait_scene(KT, t), seed, id, trait_channels, t)
+            T = trait_drawn(KT, ST, seed, id, trait_channels, t)
             for c in range(width):
                 columns[c][i] = T[c]
 
@@ -170,15 +183,24 @@ MOMENT = 1e-4
 
 
 @jit(flags=EXACT, inline=True)
-def aimed(dx: Any, dy: Any, dz: Any, x: Any, y: Any, z: Any) -> Any:
-    """A vector of the emitter's frame in the scene's: +z turns to (dx, dy, dz), +y stays level."""
+def frame(dx: Any, dy: Any, dz: Any) -> Any:
+    """The axes of an emitter's frame in the scene's: +z is (dx, dy, dz), +y stays level.
+
+    The entries of its matrix by columns; the first axis has no y.
+    """
     n = np.sqrt(dx * dx + dy * dy + dz * dz)
     if n == 0.0:
-        return x, y, z
+        return 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
     dx, dy, dz = dx / n, dy / n, dz / n
     level = np.sqrt(dx * dx + dz * dz)
     if level < 1e-9:  # The axis is +-y: x stays.
-        return x, dy * z, -dy * y
+        return 1.0, 0.0, 0.0, 0.0, -dy, 0.0, dy, 0.0
     ax, az = dz / level, -dx / level
-    bx, by, bz = dy * az, level, -dy * ax
+    return ax, az, dy * az, level, -dy * ax, dx, dy, dz
+
+
+@jit(flags=EXACT, inline=True)
+def turned(axes: Any, x: Any, y: Any, z: Any) -> Any:
+    """A vector of the emitter's frame in the scene's."""
+    ax, az, bx, by, bz, dx, dy, dz = axes
     return ax * x + bx * y + dx * z, by * y + dy * z, az * x + bz * y + dz * z

@@ -1,161 +1,227 @@
-"""Gathering laws in one loop: the sums of several laws over neighbours that cells give at once.
+"""Gathering laws in one loop: several laws' sums over neighbours that cells give at once.
 
 Lists of neighbours pay while particles move little in a step. What flies a good part of its reach
-in a step needs others each time; then it is quicker to let a cell's particles meet all that are in
-and around the cell, in vector instructions, with all laws in one loop.
+in a step needs others each time; then it is quicker to meet all that are in the cells around. Eight
+targets, next to one another, are the lanes of vectors, and meet one source after another. So there
+is nothing to choose, to copy or to add up across lanes, whatever the laws say.
 """
 
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+import re
+import threading
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motes.compile.pairs import Law, Writer
 from motes.compile.text import AXES, Text
-from motes.interact.cells import runs_around
-from motes.jit import STRICT, jit
+from motes.control.constant import Constant, Setting
+from motes.errors import SceneError
+from motes.interact.runs import chooser, runs_near
+from motes.jit import jit
+from motes.machine.lanes import put, settled, take
 
-WIDTH = 8
-"""Candidates are filled up to a multiple of this: loops over them have no rest."""
+LANES = 8
+"""Targets that meet sources together; columns of targets go on for as many beyond the last."""
 
-FAR = 1e15
-"""A coordinate [m] further away than anything, whose square single precision still holds."""
+CAUTION = 1e-6
+"""Share of the reach's square by which rounding may move a box: more than it does."""
+
+WIDE = 2.5
+"""Reaches along x within which targets that meet sources together are."""
 
 
-def read(laws: Sequence[Law], which: int) -> tuple[str, ...]:
+class Gathering:
+    """Several laws' sums over the same sources: a kernel and the numbers that it reads."""
+
+    def __init__(self, laws: Sequence[Law]) -> None:
+        self.laws = list(laws)
+        self.own, self.other = _read(laws, 0), _read(laws, 1)
+        self.sums = sum(law.sums() for law in laws)
+        self._places: dict[Any, int] = {}
+        """Where each number is. What never changes and is the same in two laws is one number, and
+        what follows from it is computed once."""
+        self._of_laws = [self._places_of(law) for law in laws]
+        self._kernel: Callable[..., Any] | None = None
+        self._first = threading.Lock()
+
+    def _places_of(self, law: Law) -> list[int]:
+        """Places of a law's reach and of its numbers."""
+        lasts = all(isinstance(c, Setting | Constant) for c in law.part.values.values())
+        found = []
+        for k, value in enumerate(_values(law, 0.0)):
+            key = float(value) if lasts else (law.address, k)
+            found.append(self._places.setdefault(key, len(self._places)))
+        return found
+
+    def numbers(self, time: float, real: type) -> NDArray[Any]:
+        """All numbers at a time, as the kernel reads them."""
+        found: NDArray[Any] = np.empty(len(self._places), real)
+        for law, places in zip(self.laws, self._of_laws, strict=True):
+            found[places] = _values(law, time)
+        return found
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Add accelerations to pushes; see `_text`.
+
+        Where a law's kernel is beyond what works on lanes, targets come one after another.
+        """
+        if self._kernel is None:
+            with self._first:
+                if self._kernel is None:
+                    return self._tried(*arguments)
+        assert self._kernel is not None
+        return self._kernel(*arguments)
+
+    def _tried(self, *arguments: Any) -> Any:
+        plain = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+        kernel = self._text(1 if plain else LANES)
+        try:
+            found = kernel(*arguments)
+        except SceneError:
+            kernel = self._text(1)
+            found = kernel(*arguments)
+        self._kernel = kernel
+        return found
+
+    def _text(self, lanes: int) -> Callable[..., Any]:
+        """The kernel that adds what follows from the sums of all laws to the targets' pushes.
+
+        It serves targets from `begin` to `end`, and returns the first that there is not enough room
+        for, and how much it needs. Where the laws have several sources, a kernel call for each, the
+        sums are `kept` in between: a call that `goes_on` begins with them, only the last `ends`.
+        """
+        text = Text(self.laws[0].precision, self.laws[0].strict)
+        prelude, body, start, keep, end, place = "", "", "", "", "", 0
+        reaches: dict[int, str] = {}
+        for i, (law, places) in enumerate(zip(self.laws, self._of_laws, strict=True)):
+            writer, reach = Writer(text, law), places[0]
+            p = re.sub(r"numbers\[(\d+)\]", lambda m: f"n{places[1 + int(m[1])]}", writer.p())  # noqa: B023
+            prelude += f"    p{i} = {p}\n"
+            if reach not in reaches:
+                reaches[reach] = f"n{reach}"
+                prelude += f"    limit{reach} = n{reach} * n{reach}\n"
+                # Who does not count is taken at the reach, where laws are finite, and times 0.
+                body += (
+                    f"                near = (square <= limit{reach}) & other\n"
+                    f"                weight{reach} = F(1.0) if near else F(0.0)\n"
+                    f"                square{reach} = min(square, limit{reach})\n"
+                    f"                length{reach} = min(length, n{reach})\n"
+                )
+            call = writer.call("near").replace("(p, ", f"(p{i}, ", 1)
+            call = call.replace("square, sqrt(square)", f"square{reach}, length{reach}")
+            width = range(place, place + law.sums())
+            place += law.sums()
+            body += f"                {''.join(f'm{k}, ' for k in width)} = {call}\n"
+            for k in width:
+                start += f"        sum{k} = take(kept[{k}], i, {lanes}) if goes_on else F(0.0)\n"
+                body += f"                sum{k} += weight{reach} * m{k}\n"
+                keep += f"            put(hold[{k}], 0, sum{k})\n"
+            sums = "".join(f"sum{k}, " for k in width)
+            a = writer.particle("A", law.fields[0], "a_")
+            given = f"{writer.translated('acceleration')}(p{i}, {a}, ({sums}))"
+            end += f"            fx, fy, fz = {given}\n"
+            end += "            px, py, pz = px + fx, py + fy, pz + fz\n"
+        numbers = "".join(f"    n{k} = numbers[{k}]\n" for k in range(len(self._places)))
+        most = list(reaches.values())
+        widest = f"max({', '.join(most)})" if len(most) > 1 else most[0]
+        lines = (
+            "@kernel\ndef gather(numbers, targets, slot, key, along, sources, grid, cells, "
+            "begin, end, run, shift, pick, hold, goes_on, ends, kept, order, push):\n"
+            f"{numbers}{prelude}    reach = {widest}\n"
+            f"    limit, wide = reach * reach * F({1 + CAUTION}), reach * F({WIDE})\n"
+        )
+        lines += "".join(f"    t_{n} = targets[{k}]\n" for k, n in enumerate(self.own))
+        lines += "".join(f"    s_{n} = sources[{k}]\n" for k, n in enumerate(self.other))
+        lines += (
+            "    i = begin\n    while i < end:\n"
+            f"        stop = same_row(i, end, key, uint64(along), t_x, wide, {lanes})\n"
+            "        low, high = bounds(t_x, t_y, t_z, i, stop)\n"
+            "        number, points = runs_near(low, high, reach, grid, cells, run, shift)\n"
+            "        if number > run.shape[0] or points > pick.size:\n"
+            "            return i, max(number, points)\n"
+            f"        me = take(slot, i, {lanes})\n"
+        )
+        lines += "".join(f"        a_{n} = take(t_{n}, i, {lanes})\n" for n in self.own)
+        lines += start + "        r = 0\n        while r < number:\n"
+        lines += (
+            "            dx, dy, dz = shift[r, 0], shift[r, 1], shift[r, 2]\n"
+            "            places = (s_x, s_y, s_z)\n"
+            "            r, held = choose(places, low, high, limit, r, number, run, shift, pick)\n"
+        )
+        lines += "".join(f"            o_{n} = settled(a_{n} - d{n})\n" for n in AXES)
+        lines += "            for e in range(held):\n                k = pick[e]\n"
+        lines += "".join(f"                b_{n} = s_{n}[k]\n" for n in self.other)
+        lines += (
+            "                rx, ry, rz = o_x - b_x, o_y - b_y, o_z - b_z\n"
+            "                square = rx * rx + ry * ry + rz * rz\n"
+            "                length = sqrt(square)\n"
+            "                other = me != int32(k)\n"
+        )
+        lines += body
+        lines += (
+            "        if ends:\n            px, py, pz = F(0.0), F(0.0), F(0.0)\n"
+            f"{end}            put(hold[0], 0, px)\n            put(hold[1], 0, py)\n"
+            "            put(hold[2], 0, pz)\n"
+            "            for e in range(stop - i):\n                row = order[i + e]\n"
+            "                for n in range(3):\n"
+            "                    push[n, row] += hold[n, e]\n"
+            f"        else:\n{keep}"
+            "            for e in range(stop - i):\n"
+            "                for n in range(kept.shape[0]):\n"
+            "                    kept[n, i + e] = hold[n, e]\n"
+            "        i = stop\n    return end, 0\n"
+        )
+        text.add(lines)
+        extra = {
+            "int32": np.int32,
+            "uint32": np.uint32,
+            "uint64": np.uint64,
+            "take": take,
+            "put": put,
+        }
+        extra |= {"runs_near": runs_near, "same_row": _same_row, "bounds": _bounds}
+        extra |= {"choose": chooser(lanes), "settled": settled}
+        found: Callable[..., Any] = text.module(extra)["gather"]
+        return found
+
+
+def _read(laws: Sequence[Law], which: int) -> tuple[str, ...]:
     """Fields that laws read of a target (0) or a source (1), place first."""
     names = {name for law in laws for name in law.fields[which]}
     return (*AXES, *sorted(names - set(AXES)))
 
 
-def gather_kernel(laws: Sequence[Law]) -> Any:
-    """The kernel that writes all laws' sums, one after another, for targets from `begin` on.
-
-    It returns the first target that there is no room for, and the candidates that it has.
-    """
-    text = Text(laws[0].precision, laws[0].strict)
-    own, other = read(laws, 0), read(laws, 1)
-    body, start, end, place = "", "", "", 0
-    prelude = ""
-    for i, law in enumerate(laws):
-        writer = Writer(text, law)
-        width = law.sums()
-        names = [f"n{place + k}" for k in range(width)]
-        numbers = writer.p().replace("numbers[", f"numbers[{i}][")
-        prelude += f"    p{i}, limit{i}, reach{i} = {numbers}, limits[{i}], sqrt(limits[{i}])\n"
-        call = writer.call("near").replace("(p, ", f"(p{i}, ", 1)
-        call = call.replace("rx, ry, rz, square, sqrt(square)", "ux, uy, uz, u2, far")
-        # Whoever does not count is put at the reach and weighs nothing: a conditional sum would
-        # keep the loop from becoming vector instructions.
-        body += f"                near = square <= limit{i}\n"
-        body += (
-            f"                weight, u2 = F(1.0 if near else 0.0), square if near else limit{i}\n"
-        )
-        body += (
-            f"                ux, far = rx if near else reach{i}, length if near else reach{i}\n"
-        )
-        body += "                uy, uz = ry if near else F(0.0), rz if near else F(0.0)\n"
-        body += f"                {', '.join(names)}, = {call}\n"
-        for k in range(place, place + width):
-            start += f"            sum{k} = F(0.0)\n"
-            body += f"                sum{k} += weight * n{k}\n"
-            end += f"            out[{k}, t] = sum{k}\n"
-        place += width
-    limits = ", ".join(f"limit{i}" for i in range(len(laws)))
-    widest = f"max({limits})" if len(laws) > 1 else limits
-    lines = (
-        "@kernel\ndef gather(numbers, limits, grid, targets, key, sources, cells, itself, "
-        "begin, end, room_, out):\n"
-        "    runs, slots, room, near_, pick, kept = room_\n"
-        "    number, points, size, i = 0, 0, 0, begin\n"
-        f"{prelude}    most = {widest}\n"
-    )
-    lines += "".join(f"    t_{n} = targets[{k}]\n" for k, n in enumerate(own))
-    for k, n in enumerate(other):
-        lines += f"    s_{n}, k_{n} = sources[{k}], kept[{k}]\n"
-    lines += "".join(f"    c_{n} = room[{k}]\n" for k, n in enumerate(AXES))
-    lines += (
-        "    while i < end:\n"
-        "        now, stop = key[i], i + 1\n"
-        "        while stop < end and key[stop] == now:\n            stop += 1\n"
-        "        number, points, crosses = runs_around(now, grid, cells, runs)\n"
-        f"        if points + {WIDTH} > slots.size:\n            return i, points\n"
-        "        fill(number, runs, sources, room, slots)\n"
-        "        if crosses:\n"
-        "            bring((t_x[i], t_y[i], t_z[i]), grid.box, points, room)\n"
-        "        for t in range(i, stop):\n"
-        "            me = uint32(t) if itself else nobody\n"
-    )
-    lines += "".join(f"            a_{n} = t_{n}[t]\n" for n in own)
-    lines += start + "            place = (a_x, a_y, a_z)\n"
-    lines += "            held = choose(place, room, slots[:points], me, most, near_, pick)\n"
-    lines += "            for e in range(held):\n"
-    lines += "                q = pick[e]\n                k = slots[q]\n"
-    for n in other:
-        lines += f"                k_{n}[e] = {f'c_{n}[q]' if n in AXES else f's_{n}[k]'}\n"
-    lines += f"            size = -(-held // {WIDTH}) * {WIDTH}\n"
-    lines += "            for e in range(held, size):\n"
-    for n in other:
-        lines += f"                k_{n}[e] = F({FAR if n in AXES else 0.0!r})\n"
-    lines += "".join(f"            q_{n} = k_{n}[:size]\n" for n in other)
-    lines += "            for q in range(q_x.size):\n"
-    lines += "".join(f"                b_{n} = q_{n}[q]\n" for n in other)
-    lines += (
-        "                rx, ry, rz = a_x - b_x, a_y - b_y, a_z - b_z\n"
-        "                square = rx * rx + ry * ry + rz * rz\n"
-        "                length = sqrt(square)\n"
-    )
-    lines += body + end + "        i = stop\n    return end, 0\n"
-    text.add(lines)
-    extra = {"uint32": np.uint32, "nobody": np.uint32(0xFFFFFFFF), "runs_around": runs_around}
-    extra |= {"fill": fill, "bring": bring, "choose": choose}
-    return text.module(extra)["gather"]
-
-
-@jit(flags=STRICT)
-def fill(number: Any, runs: Any, sources: Any, room: Any, slot: Any) -> None:
-    """Copy the places of the sources in some runs to consecutive memory."""
-    end = 0
-    for k in range(number):
-        low, high = runs[k, 0], runs[k, 1]
-        begin, end = end, end + high - low
-        for axis in range(3):
-            old, new = sources[axis, low:high], room[axis, begin:end]
-            for q in range(old.size):
-                new[q] = old[q]
-        mine = slot[begin:end]
-        for q in range(mine.size):
-            mine[q] = np.uint32(low + q)
+def _values(law: Law, time: float) -> list[float]:
+    return [law.reach(time), *law.numbers(time, np.float64)]
 
 
 @jit(inline=True)
-def choose(place: Any, room: Any, slot: Any, me: Any, limit: Any, near: Any, pick: Any) -> Any:
-    """Write which candidates are within reach of a place, and not the one itself; how many."""
-    x, y, z = place
-    xs, ys, zs = room[0][: slot.size], room[1][: slot.size], room[2][: slot.size]
-    marks = near[: slot.size]
-    for q in range(slot.size):
-        dx, dy, dz = x - xs[q], y - ys[q], z - zs[q]
-        marks[q] = (dx * dx + dy * dy + dz * dz <= limit) & (slot[q] != me)
-    new = np.uint64(0)
-    for q in range(slot.size):
-        pick[new] = np.uint32(q)
-        new += np.uint64(marks[q])
-    return np.int64(new)
+def _same_row(begin: Any, end: Any, key: Any, along: Any, x: Any, wide: Any, lanes: Any) -> Any:
+    """End of the targets from `begin` on that share a row of cells and are not far apart."""
+    bound = (key[begin] // along + np.uint64(1)) * along
+    low = high = x[begin]
+    stop = begin + 1
+    while stop < end and stop - begin < lanes and key[stop] < bound:
+        low, high = min(low, x[stop]), max(high, x[stop])
+        if high - low > wide:
+            break
+        stop += 1
+    return stop
 
 
-@jit(flags=STRICT)
-def bring(center: Any, box: Any, size: Any, room: Any) -> None:
-    """Replace sources by their images nearest to a place, along periodic axes."""
-    for axis in range(3):
-        period = box[axis]
-        if np.isfinite(period):
-            for q in range(size):
-                away = room[axis, q] - center[axis]
-                if away > period / 2:
-                    room[axis, q] -= period
-                elif away < -period / 2:
-                    room[axis, q] += period
+@jit(inline=True)
+def _bounds(x: Any, y: Any, z: Any, begin: Any, end: Any) -> Any:
+    """Lowest and highest coordinates of some targets."""
+    low_x, low_y, low_z = x[begin], y[begin], z[begin]
+    high_x, high_y, high_z = low_x, low_y, low_z
+    for i in range(begin + 1, end):
+        low_x, high_x = min(low_x, x[i]), max(high_x, x[i])
+        low_y, high_y = min(low_y, y[i]), max(high_y, y[i])
+        low_z, high_z = min(low_z, z[i]), max(high_z, z[i])
+    return (low_x, low_y, low_z), (high_x, high_y, high_z)

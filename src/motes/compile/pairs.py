@@ -2,7 +2,7 @@
 
 A gathering law's `near(p, a, b, r)` is summed over all neighbours b of a; its acceleration follows
 from the sums. A pair law is the gathering law whose sums are the force on a. The neighbours of a
-cluster are gathered into consecutive memory, so that the loop over them is a few vector
+particle are gathered into consecutive memory, so that the loop over them is a few vector
 instructions for eight neighbours, whatever the law says.
 """
 
@@ -24,14 +24,10 @@ from motes.control.constant import Constant, Setting
 from motes.errors import SceneError
 from motes.jit import jit
 from motes.kernel.language import can_fold
+from motes.machine.shuffles import LANES, taken_apart
 
 FORCE, POTENTIAL, VIRIAL = "force", "potential", "virial"
 """What a pair law's loops sum up besides what a gathering law's do, `near`."""
-
-
-LISTED = ("x0", "y0", "z0")
-"""Where a particle was when the lists were built: for lists that are to hold exactly the pairs
-within their radius, though they are not built as soon as they miss one."""
 
 
 class Law:
@@ -46,7 +42,12 @@ class Law:
         self.nearest = int(nearest)
         self.rebuild = int(part.values["rebuild"].document())
         self.owner = f'interaction "{part.name}"'
-        self._last: tuple[float, dict[tuple[str, str], dict[str, Any]]] = (float("nan"), {})
+        values = part.values.values()
+        self.lasting = all(isinstance(control, Setting | Constant) for control in values)
+        """Whether its numbers are the same at all times."""
+        self._time = float("nan")
+        self._values_now: dict[tuple[str, str], dict[str, Any]] = {}
+        self._numbers_now: dict[Any, NDArray[Any]] = {}
         self._missing()
 
     def _missing(self) -> None:
@@ -67,13 +68,17 @@ class Law:
 
         `pair`: target and source, for laws that mix what two species have.
         """
-        if self._last[0] != time:
-            self._last = time, {}
+        self._at(time)
         if type(self.part).kernel("mixed") is None:
             pair = ("", "")
-        if pair not in self._last[1]:
-            self._last[1][pair] = self._values(time, pair)
-        return self._last[1][pair]
+        if pair not in self._values_now:
+            self._values_now[pair] = self._values(time, pair)
+        return self._values_now[pair]
+
+    def _at(self, time: float) -> None:
+        """Forget what was known of another time."""
+        if self._time != time and not (self.lasting and self._values_now):
+            self._time, self._values_now, self._numbers_now = time, {}, {}
 
     def _values(self, time: float, pair: tuple[str, str]) -> dict[str, Any]:
 
@@ -109,8 +114,12 @@ class Law:
 
     def numbers(self, time: float, real: type, pair: tuple[str, str] = ("", "")) -> NDArray[Any]:
         """All numbers of `p`, as kernels read them."""
-        values = self.values(time, pair)
-        return np.array([x for key in self._fields for x in np.atleast_1d(values[key])], real)
+        self._at(time)
+        if (real, pair) not in self._numbers_now:
+            values = self.values(time, pair)
+            numbers = [x for key in self._fields for x in np.atleast_1d(values[key])]
+            self._numbers_now[real, pair] = np.array(numbers, real)
+        return self._numbers_now[real, pair]
 
     # ------------------------------------------------------------------ fields of particles
 
@@ -126,9 +135,6 @@ class Law:
             own.add("mass")
         else:
             own |= self._read(self._kernel("acceleration"), 1)
-        if self.rebuild:
-            own |= set(LISTED)
-            other |= set(LISTED)
         return _in_order(own), _in_order(other)
 
     @property
@@ -179,7 +185,8 @@ class Law:
             width = _returned(self._kernel("near"), self.owner)
             writer.sweep("near", writer.call("near"), width)
         writer.finish(width)
-        return text.module({"int32": np.int32, "uint32": np.uint32, "choose": choose}), width
+        extra = {"int64": np.int64, "uint64": np.uint64, "uint32": np.uint32, "choose": choose}
+        return text.module({**extra, "taken_apart": taken_apart}), width
 
 
 class Writer:
@@ -198,16 +205,18 @@ class Writer:
             place += width
         return self.text.record("P", expressions or {"nothing": "F(0.0)"})
 
-    def _particle(self, kind: str, names: tuple[str, ...], prefix: str) -> str:
+    def particle(self, kind: str, names: tuple[str, ...], prefix: str) -> str:
+        """An expression for a particle, from names of its numbers after a prefix."""
         return self.text.record(kind, {name: f"{prefix}{name}" for name in names})
 
     def call(self, name: str) -> str:
         """A call of a kernel of a pair."""
-        a, b = self._particle("A", self.own, "a_"), self._particle("B", self.other, "b_")
+        a, b = self.particle("A", self.own, "a_"), self.particle("B", self.other, "b_")
         fields = {"x": "rx", "y": "ry", "z": "rz", "square": "square", "length": "sqrt(square)"}
-        return f"{self._translated(name)}(p, {a}, {b}, {self.text.record('R', fields)})"
+        return f"{self.translated(name)}(p, {a}, {b}, {self.text.record('R', fields)})"
 
-    def _translated(self, name: str) -> str:
+    def translated(self, name: str) -> str:
+        """The name of one of the law's kernels in the text."""
         if name not in self._names:
             law = self.law
             function = law._kernel(name)
@@ -218,7 +227,7 @@ class Writer:
                 and isinstance(control, Setting)
                 and isinstance(control.value, int | float)
             }
-            if all(isinstance(c, Setting | Constant) for c in law.part.values.values()):
+            if law.lasting:
                 settings |= {k: (0.0,) for k in ("slope", "shift") if law.values(0.0).get(k) == 0.0}
             known = settings if settings and can_fold(function) else None
             self._names[name] = self.text.translation.add(function, law.owner, known)
@@ -233,51 +242,53 @@ class Writer:
         self.sweep(VIRIAL, f"products({self.call(FORCE)}, rx, ry, rz)", 6)
 
     def sweep(self, what: str, call: str, width: int) -> None:
-        """The loop that sums a call's numbers up."""
-        own, other, sums = self.own, self.other, range(width)
+        """The loop that sums a call's numbers up over lists of whole vectors."""
+        own, sums = self.own, range(width)
+        other = tuple(n for n in self.other if n not in AXES)
         lines = (
-            f"@kernel\ndef sweep_{what}(numbers, targets, sources, cluster, first, entry, itself, "
-            "limit, listed, room, best, pick, out):\n"
+            f"@kernel\ndef sweep_{what}(numbers, targets, records, sources, limit, out, "
+            "begin, first, entry, longest):\n"
+            f"    room = empty(({len(other) + 3}, longest), F)\n"
             f"    p = {self.p()}\n    quarter = F(0.25) * limit\n"
         )
         lines += "".join(f"    t_{n} = targets[{i}]\n" for i, n in enumerate(own))
         lines += "".join(f"    s_{n} = sources[{i}]\n" for i, n in enumerate(other))
-        lines += "    for c in range(cluster.size - 1):\n"
-        lines += "        slot = entry[first[c]:first[c + 1]]\n"
-        for i, n in enumerate(other):
-            lines += f"        q_{n} = room[{i}][:slot.size]\n"
-        lines += "        for q in range(slot.size):\n            k = uint32(slot[q])\n"
-        lines += "".join(f"            q_{n}[q] = s_{n}[k]\n" for n in other)
-        lines += "        for i in range(cluster[c], cluster[c + 1]):\n"
-        lines += "".join(f"            a_{n} = t_{n}[i]\n" for n in own)
-        lines += "            me = int32(i) if itself else int32(-1)\n"
-        lines += "".join(f"            sum{k} = F(0.0)\n" for k in sums)
-        loaded = "                rx, ry, rz = a_x - b_x, a_y - b_y, a_z - b_z\n"
-        loaded += "                square = rx * rx + ry * ry + rz * rz\n"
-        term = "(" + ", ".join(f"n{k}" for k in sums) + f",) = {call}\n"
         if self.law.nearest:
-            lines += "            found = choose(a_x, a_y, a_z, q_x, q_y, q_z, slot, me, limit, "
-            lines += "best, pick)\n            for e in range(found):\n"
-            lines += "                q = pick[e]\n"
-            lines += "".join(f"                b_{n} = q_{n}[q]\n" for n in other)
-            lines += f"{loaded}                {term}"
-            lines += "".join(f"                sum{k} += n{k}\n" for k in sums)
+            lines += f"    best, pick = empty({self.law.nearest}, F), "
+            lines += f"empty({self.law.nearest}, int64)\n"
+        lines += "    for k in range(uint64(first.size - 1)):\n"
+        lines += "        i = uint64(begin) + k\n"
+        lines += f"        low, high = {LANES} * first[k], {LANES} * first[k + 1]\n"
+        lines += "        slot = entry[low:high]\n"
+        for i, n in enumerate((*AXES, *other)):
+            lines += f"        q_{n} = room[{i}][:slot.size]\n"
+        lines += "        taken_apart(records, slot, q_x, q_y, q_z)\n"
+        if other:
+            lines += "        for q in range(slot.size):\n            k_ = uint32(slot[q])\n"
+            lines += "".join(f"            q_{n}[q] = s_{n}[k_]\n" for n in other)
+        lines += "".join(f"        a_{n} = t_{n}[i]\n" for n in own)
+        lines += "".join(f"        sum{j} = F(0.0)\n" for j in sums)
+        loaded = "            rx, ry, rz = a_x - b_x, a_y - b_y, a_z - b_z\n"
+        loaded += "            square = rx * rx + ry * ry + rz * rz\n"
+        term = "(" + ", ".join(f"n{j}" for j in sums) + f",) = {call}\n"
+        if self.law.nearest:
+            lines += "        found = choose(a_x, a_y, a_z, q_x, q_y, q_z, limit, best, pick)\n"
+            lines += "        for e in range(found):\n            q = pick[e]\n"
         else:
-            lines += "            for q in range(slot.size):\n"
-            lines += "".join(f"                b_{n} = q_{n}[q]\n" for n in other)
-            lines += f"{loaded}                near = (square <= limit) & (slot[q] != me)\n"
-            if self.law.rebuild:
-                for n in LISTED:
-                    lines += f"                d_{n} = a_{n} - b_{n}\n"
-                square = " + ".join(f"d_{n} * d_{n}" for n in LISTED)
-                lines += f"                near &= ({square}) <= listed\n"
+            lines += "        for q in range(high - low):\n"
+        lines += "".join(f"            b_{n} = q_{n}[q]\n" for n in (*AXES, *other)) + loaded
+        if self.law.nearest:
+            lines += f"            {term}"
+            lines += "".join(f"            sum{j} += n{j}\n" for j in sums)
+        else:
             # Who does not count is taken at half of the reach, where laws are finite, and times 0:
             # a choice of the summand itself would not become vector instructions.
-            lines += "                square = square if near else quarter\n"
-            lines += "                w = F(1.0) if near else F(0.0)\n"
-            lines += f"                {term}"
-            lines += "".join(f"                sum{k} += n{k} * w\n" for k in sums)
-        lines += "".join(f"            out[{k}, i] += sum{k}\n" for k in sums)
+            lines += "            near = square <= limit\n"
+            lines += "            square = square if near else quarter\n"
+            lines += "            w = F(1.0) if near else F(0.0)\n"
+            lines += f"            {term}"
+            lines += "".join(f"            sum{j} += n{j} * w\n" for j in sums)
+        lines += "".join(f"        out[{j}, i] += sum{j}\n" for j in sums)
         self.text.add(lines)
 
     def finish(self, width: int) -> None:
@@ -293,8 +304,8 @@ class Writer:
             lines += "        w = F(1.0) / a_mass\n"
             lines += "        fx, fy, fz = sums[0, i] * w, sums[1, i] * w, sums[2, i] * w\n"
         else:
-            a = self._particle("A", names, "a_")
-            lines += f"        fx, fy, fz = {self._translated('acceleration')}(p, {a}, {given})\n"
+            a = self.particle("A", names, "a_")
+            lines += f"        fx, fy, fz = {self.translated('acceleration')}(p, {a}, {given})\n"
         lines += "        row = order[i]\n"
         lines += "".join(f"        push[{k}, row] += f{axis}\n" for k, axis in enumerate(AXES))
         self.text.add(lines)
@@ -302,15 +313,14 @@ class Writer:
 
 @jit(inline=True)
 def choose(
-    x: Any, y: Any, z: Any, xs: Any, ys: Any, zs: Any, slot: Any, me: Any, limit: Any,
-    best: Any, pick: Any,
-) -> Any:  # fmt: skip
+    x: Any, y: Any, z: Any, xs: Any, ys: Any, zs: Any, limit: Any, best: Any, pick: Any
+) -> Any:
     """Places of the nearest few within reach, nearest first, into `pick`; returns how many."""
     found = 0
-    for q in range(slot.size):
+    for q in range(xs.size):
         dx, dy, dz = x - xs[q], y - ys[q], z - zs[q]
         square = dx * dx + dy * dy + dz * dz
-        if square > limit or slot[q] == me or (found == pick.size and square >= best[found - 1]):
+        if square > limit or (found == pick.size and square >= best[found - 1]):
             continue
         if found < pick.size:
             found += 1

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from motes.compile.motion import Motion
-from motes.compile.straight import THREATENED
+from motes.compile.straight import HELD
 from motes.compile.surfaces import Surfaces
 from motes.compile.text import AXES, STATE, Text
 from motes.jit import jit
@@ -61,7 +61,10 @@ def write_staged(text: Text, motion: Motion) -> None:
 
 
 def write_threats(text: Text, surfaces: Surfaces) -> None:
-    """Write `threats`, which flags rows that may meet a solid on the way from a state to Y."""
+    """Write `threats`, which lists rows that may meet a solid on the way from a state to Y.
+
+    They stand in `held` from `lo` on; the kernel returns how many.
+    """
     slices = "".join(
         f"    {n}, n{n} = {'velocity' if n.startswith('v') else 'position'}[{k % 3}][lo:hi], "
         f"Y[{k}][lo:hi]\n"
@@ -70,11 +73,12 @@ def write_threats(text: Text, surfaces: Surfaces) -> None:
     row, ends = (", ".join(f"{m}{n}[i]" for n in STATE) for m in ("", "n"))
     moved = "D0, solids(scene(K, end))" if surfaces.moving else "D0, D0"
     text.add(
-        "@kernel\ndef threats(position, velocity, Y, flags, K, t, end, lo, hi):\n"
+        "@kernel\ndef threats(position, velocity, flags, held, K, Y, t, end, lo, hi):\n"
         f"{slices}    D0 = solids(scene(K, t))\n    D0, D1 = {moved}\n"
-        "    flag, h = flags[lo:hi], F(end - t)\n    for i in range(x.size):\n"
-        f"        flag[i] = uint8({THREATENED}) if threatened(D0, D1, {row}, {ends}, h) "
-        "else uint8(0)\n"
+        "    flag, h, count = flags[lo:hi], F(end - t), 0\n    for i in range(x.size):\n"
+        f"        flag[i] = uint8({HELD}) * uint8(threatened(D0, D1, {row}, {ends}, h))\n"
+        f"    for i in range(flag.size):\n        if flag[i]:\n"
+        "            held[lo + count] = lo + i\n            count += 1\n    return count\n"
     )
 
 

@@ -1,7 +1,7 @@
 """The straight pass: one step of every particle as a SIMD loop, and the retirement loop.
 
-With solids, a row whose path might meet one is left as it was and flagged; the exceptions pass
-takes it through its impacts.
+With solids, a row whose path might meet one is held: it is left as it was and listed, from
+`held[lo]` on; the kernel returns how many. The exceptions pass takes them through their impacts.
 """
 
 from __future__ import annotations
@@ -26,15 +26,25 @@ def write_straight(text: Text, motion: Motion, surfaces: Surfaces | None) -> Non
         _write_retire(text, loop)
 
 
-HEAD = "(position, velocity, birth, columns, flags, K, t, end, lo, hi):\n"
+HEAD = "(position, velocity, birth, columns, flags, held, K, t, end, lo, hi):\n"
 
-CHUNK = 1024
-"""Rows that are prepared at once. Their ages are found before the main loop, whose SIMD width a
-double would halve. Their old state is put aside where rows may be left as they were: to store only
-some rows of a SIMD register is slow."""
+CHUNK = 2048
+"""Rows whose ages are found at once: a double in the main loop would halve its SIMD width."""
 
-DEAD, THREATENED = 1, 2
+LEAST = 1e-30
+"""Clearance [m] below which a row is held back, so that a clearance of zero has the sign."""
+
+DEAD, HELD = 1, 2
 """What a row's flag says."""
+
+LISTING = f"""        if some != 0:
+            for i in range(flag.size):
+                if flag[i] & {HELD}:
+                    held[lo + count] = low + i
+                    count += 1
+    return count
+"""
+"""Most blocks of rows are clear, and are not looked through."""
 
 
 class _Loop:
@@ -83,9 +93,18 @@ def _write_step(
     marks = []
     if surfaces is not None:
         prelude += "    D0, D1 = solids(scene(K, t)), solids(scene(K, end))\n"
-        body += f"            meets = threatened(D0, D1, {loop.row}, {ends}, h)\n"
-        marks.append(f"uint8({THREATENED}) * uint8(meets)")
-    body += "".join(f"            {n}[i] = n{n}\n" for n in loop.state)
+        body += (
+            f"            clear = clearance(D0, D1, {loop.row}, {ends}, h) - F({LEAST})\n"
+            "            stays = clear.view(bits) >> SIGN\n            some = bits(some | stays)\n"
+        )
+        marks.append(f"uint8(stays & {HELD})")
+        for n in loop.state:
+            body += (
+                f"            was = {n}[i].view(bits)\n"
+                f"            {n}[i] = bits(was ^ ((was ^ n{n}.view(bits)) & ~stays)).view(F)\n"
+            )
+    else:
+        body += "".join(f"            {n}[i] = n{n}\n" for n in loop.state)
     if motion.mortal:
         body += f"            gone = dies({ends}, old[i], C, {after}, L, now)\n"
         marks.append(f"uint8({DEAD}) * uint8(gone)")
@@ -99,30 +118,17 @@ def _write_step(
             found += (
                 f"        for i in range(born.size):\n            {name}[i] = F({time} - born[i])\n"
             )
-    undo = ""
+    listing = ""
     if surfaces is not None:
-        for n in loop.state:
-            prelude += f"    room_of_{n} = empty({CHUNK}, F)\n"
-            found += f"        old_{n} = room_of_{n}[: high - low]\n"
-        copies, back = (
-            "".join(f"{indent}{to}[i] = {of}[i]\n" for to, of in pairs)
-            for indent, pairs in (
-                (" " * 12, [(f"old_{n}", n) for n in loop.state]),
-                (" " * 20, [(n, f"old_{n}") for n in loop.state]),
-            )
-        )
-        found += f"        for i in range(x.size):\n{copies}"
-        undo = (
-            "        seen = 0\n        for i in range(flag.size):\n            seen |= flag[i]\n"
-            f"        if seen & {THREATENED}:\n            for i in range(flag.size):\n"
-            f"                if flag[i] & {THREATENED}:\n{back}"
-        )
+        prelude += "    count = 0\n"
+        found += "        some = bits(0)\n"
+        listing = LISTING
     text.add(
         f"@kernel\ndef {'young' if young else 'straight'}{HEAD}{prelude}"
         f"    for low in range(lo, hi, {CHUNK}):\n"
         f"        high = min(low + {CHUNK}, hi)\n"
         f"{loop.slices('low', 'high', ' ' * 8)}        flag = flags[low:high]\n"
-        f"{found}        for i in range(x.size):\n{body}{undo}"
+        f"{found}        for i in range(x.size):\n{body}{listing}"
     )
 
 

@@ -147,14 +147,20 @@ class CompiledSystem:
         """Potential (n,) [m2/s2] of the forces that have one, at each particle."""
         result = np.zeros(particles.count)
         if any(force.kernel("potential") for _, force in self.motion.forces):
-            text = Text("double", self._strict)
-            write_potentials(text, self.motion)
-            text.add(text.values.scene_text())
-            text.module()["potentials"](
+            kernel, numbers = self._potentials
+            kernel(
                 particles.position, particles.velocity, particles.birth, particles.columns,
-                text.values.arrays(np.float64), time, result, 0, particles.count,
+                numbers, time, result, 0, particles.count,
             )  # fmt: skip
         return result
+
+    @cached_property
+    def _potentials(self) -> tuple[Any, Any]:
+        """The kernel of potentials, and the numbers that it reads."""
+        text = Text("double", self._strict)
+        write_potentials(text, self.motion)
+        text.add(text.values.scene_text())
+        return text.module()["potentials"], text.values.arrays(np.float64)
 
     def carried(self, particles: Particles, time: float) -> NDArray[np.float64]:
         """Velocity (n, 3) [m/s] that the flows give to particles that have none of their own."""
@@ -181,7 +187,10 @@ class CompiledSystem:
             text, channels = Text("double", self._strict), Channels()
             write_emitter(text, emitter, address, channels)
             text.add(text.values.scene_text())
-            kernel = births_kernel(text.module(extra), trait_module, width, self.motion.inertial)
+            steady = not (text.values.varies_in_time or traits.values.varies_in_time)
+            kernel = births_kernel(
+                text.module(extra), trait_module, width, self.motion.inertial, steady
+            )
             result[address] = CompiledEmitter(
                 kernel, text.values.arrays(np.float64), channels.array()
             )

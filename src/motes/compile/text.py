@@ -9,7 +9,6 @@ files beside this one and call these functions.
 from __future__ import annotations
 
 import hashlib
-import linecache
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -22,8 +21,8 @@ from motes.catalog import Component
 from motes.compile.values import Values
 from motes.control.constant import Constant, Setting
 from motes.control.curve import TABLE_SIZE
-from motes.files import written_whole
-from motes.jit import FAST, STRICT, cache_folder, jit
+from motes.generated import executed
+from motes.jit import FAST, STRICT, jit
 from motes.kernel import ELEMENTARY
 from motes.kernel.language import Translation, can_fold
 
@@ -109,6 +108,8 @@ class Text:
             "__name__": __name__,  # Cached machine code is rebuilt in an importable module.
             "F": self.real,
             "uint8": np.uint8,
+            "bits": np.int32 if self.precision == "single" else np.int64,
+            "SIGN": np.int32(31) if self.precision == "single" else np.int64(63),
             "empty": np.empty,
             "inline": lambda f: jit(f, flags=flags, inline=True),
             "kernel": lambda f: jit(f, flags=flags, numba=False),
@@ -129,12 +130,6 @@ class Text:
         return executed(source, scope)
 
 
-def executed(source: str, scope: dict[str, Any]) -> dict[str, Any]:
-    """Run the text of a module in a scope, kept where the compiler and tracebacks find it."""
-    exec(compile(source, _keep(source), "exec"), scope)
-    return scope
-
-
 def _known(component: Component) -> dict[str, tuple[float, ...]]:
     """Own parameters that become part of the machine code: settings, and what has its default."""
     found: dict[str, tuple[float, ...]] = {}
@@ -151,21 +146,6 @@ def _known(component: Component) -> dict[str, tuple[float, ...]]:
 def packed(expressions: Sequence[str]) -> str:
     """One expression, or a tuple of several."""
     return expressions[0] if len(expressions) == 1 else f"({', '.join(expressions)})"
-
-
-def _keep(source: str) -> str:
-    """Write the text beside the kernels, so that debuggers and tracebacks can show it."""
-    name = hashlib.sha256(source.encode()).hexdigest()[:24]
-    path = cache_folder() / "modules" / f"{name}.py"
-    try:
-        if not path.exists():
-            path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-            with written_whole(path) as file:
-                file.write(source.encode())
-    except OSError:
-        pass  # Only a convenience: the text also stands in linecache.
-    linecache.cache[str(path)] = (len(source), None, source.splitlines(True), str(path))
-    return str(path)
 
 
 @cache

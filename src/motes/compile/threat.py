@@ -12,6 +12,8 @@ c = h v1 / 3 and b, what remains. Two bounds serve:
 
 from __future__ import annotations
 
+from functools import reduce
+
 from motes.compile.motion import Motion
 from motes.compile.surfaces import Surfaces
 from motes.compile.text import AXES, STATE, Text
@@ -21,7 +23,10 @@ END = tuple(f"n{name}" for name in STATE)
 
 
 def write_threat(text: Text, motion: Motion, surfaces: Surfaces) -> None:
-    """Write `threatened(D0, D1, x, ..., vz, nx, ..., nvz, h)`."""
+    """Write `clearance(D0, D1, x, ..., vz, nx, ..., nvz, h)` and `threatened`, of the same.
+
+    The clearance is above zero for a path that meets no solid.
+    """
     lines = "    third = h * F(0.3333333333333333)\n"
     for a in AXES:
         if motion.inertial and not motion.flows:
@@ -32,8 +37,7 @@ def write_threat(text: Text, motion: Motion, surfaces: Surfaces) -> None:
     steep = []
     for k, (_, solid) in enumerate(surfaces.solids):
         if getattr(type(solid), "flat", False) and not surfaces.moving:
-            tests.append(f"hull_{k}")
-            lines += f"    hull_{k} = {_lowest(k)} <= F(0.0)\n"
+            tests.append(_lowest(k))
         else:
             steep.append(k)
     if steep:
@@ -45,12 +49,15 @@ def write_threat(text: Text, motion: Motion, surfaces: Surfaces) -> None:
         lines += f"    d = solid_{k}(D0, x, y, z) + solid_{k}(D1, nx, ny, nz)\n"
         if surfaces.moving:  # In the solid's frame the path is longer by what the solid moves.
             lines += f"    d -= carried_by(D0, D1, {surfaces.starts[k]}, x, y, z)\n"
-        lines += f"    near_{k} = (d <= F(0.0)) | (d * d <= F(3.0) * l2)\n"
-        tests.append(f"near_{k}")
-    text.add(
-        f"@inline\ndef threatened(D0, D1, {', '.join((*STATE, *END))}, h):\n"
-        f"{lines}    return {' | '.join(tests)}\n"
-    )
+        lines += f"    far_{k} = min(d, d * d - F(3.0) * l2)\n"
+        tests.append(f"far_{k}")
+    names = f"D0, D1, {', '.join((*STATE, *END))}, h"
+    text.add(f"@inline\ndef clearance({names}):\n{lines}    return {reduce(_smaller, tests)}\n")
+    text.add(f"@inline\ndef threatened({names}):\n    return clearance({names}) <= F(0.0)\n")
+
+
+def _smaller(a: str, b: str) -> str:
+    return f"min({a}, {b})"
 
 
 def _lowest(k: int) -> str:
@@ -62,4 +69,4 @@ def _lowest(k: int) -> str:
         ("nx", "ny", "nz"),
     )
     a, b, c, d = (f"solid_{k}(D0, {', '.join(point)})" for point in points)
-    return f"min(min({a}, {b}), min({c}, {d}))"
+    return _smaller(_smaller(a, b), _smaller(c, d))

@@ -6,7 +6,7 @@ momentum and order. Here each stage is evaluated for the whole group before the 
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -139,12 +139,12 @@ class Group:
     ) -> dict[str, NDArray[Any]]:
         pushes = {name: np.zeros((3, m.alive), m.y.dtype) for name, m in members.items()}
         if self.interactions:
-            bodies = [
-                Bodies(
-                    name, np.ascontiguousarray(m.y[:3, : m.alive]), m.stepper.mass(m.rows, m.alive)
+            bodies = []
+            for name, m in members.items():
+                x, mass = np.ascontiguousarray(m.y[:3, : m.alive]), m.stepper.mass(m.rows, m.alive)
+                bodies.append(
+                    Bodies(name, x, mass, partial(m.stepper.numbers, m.rows, m.alive, time))
                 )
-                for name, m in members.items()
-            ]
             for _, interaction in self.interactions:
                 chosen, p = partners(interaction, bodies), values(interaction, time)
                 found = kernel(interaction, "accelerations")(p, chosen)

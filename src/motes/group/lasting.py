@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from motes.compile.pairs import Law
 from motes.control.curve import Curve
 from motes.interact.arrange import Arranged, Box
-from motes.interact.clusters import Part
+from motes.interact.clusters import Clusters
+from motes.jit import Calls
 from motes.state import Particles
 from motes.step import Stepper
 
 CAUTION = 1 - 2.0**-10
 """Share of the allowed way after which a list is stale: more than rounding takes away."""
+
+
+SHORT = 0.4
+"""Margin of the lists of particles as a share of that of the lists of clusters."""
 
 
 @dataclass
@@ -61,14 +66,20 @@ class Lists:
     radius: float
     """What is within it is listed [m]."""
     arranged: dict[str, Arranged]
-    near: dict[tuple[str, str], list[Part]]
-    """Lists by target and source."""
+    near: dict[tuple[str, str], list[Clusters]]
+    """Lists of clusters by target and source."""
     kept: dict[str, tuple[int, int]]
     """Rows and deaths for which they hold."""
     step: int = 0
     """Number of the step in which they were built."""
     columns: dict[tuple[str, str], NDArray[Any]] = field(default_factory=dict)
     """What does not change while they hold, by system and name, in the order of slots."""
+    short: dict[tuple[str, str], Calls] = field(default_factory=dict)
+    """Lists of particles by target and source: parts that loops over them are called with."""
+    short_radius: float = 0.0
+    """What was within it when they were chosen is in them [m]."""
+    marks: dict[str, NDArray[Any]] = field(default_factory=dict)
+    """Where particles (n, 4) were then [m]."""
     settled: bool = False
     """Whether rows are in the order of cells."""
 
@@ -88,16 +99,20 @@ class Lasting:
     """Systems whose rows are scattered, to be moved before the next step."""
     steps: int = 0
     """How many steps were begun."""
+    rooms: dict[Any, Any] = field(default_factory=dict)
+    """Memory of lists that nobody else holds: those that replace them may be written there."""
 
     def copy(self) -> Lasting:
-        """A copy that shares arrays, which are replaced and never written to."""
-        return replace(self, lists=list(self.lists), untidy=set(self.untidy))
+        """A copy that shares arrays, which are replaced and not written to from now on."""
+        self.rooms = {}
+        return replace(self, lists=list(self.lists), untidy=set(self.untidy), rooms={})
 
     def arrays(self) -> Iterator[NDArray[Any]]:
         """Everything that can change the next bit."""
         for part in self.lists:
             for arranged in part.arranged.values() if part else ():
                 yield from (arranged.order, arranged.real.position)
+            yield from part.marks.values() if part else ()
         yield from (self.push or {}).values()
 
 
@@ -118,6 +133,11 @@ class Class:
         """Systems that take part."""
         return sorted({name for pair in self.pairs for name in pair})
 
+    @property
+    def every(self) -> int:
+        """Steps between builds of lists, 0 where they follow from how far particles go."""
+        return min(law.rebuild for law, _, _ in self.laws)
+
     def reach(self, time: float) -> float:
         """The longest reach at a time [m]."""
         return max(law.reach(time) for law, _, _ in self.laws)
@@ -129,8 +149,22 @@ class Class:
         )
         return min(wanted, 0.999 * periodic.shortest)
 
-    def stale(self, found: Lists, moved: float, time: float, step: int) -> bool:
-        """Whether lists may miss a pair after particles have moved [m], or were to last shorter."""
-        if every := min(law.rebuild for law, _, _ in self.laws):
-            return step - found.step >= every or not np.isfinite(moved)
-        return not 2 * moved <= (found.radius - self.reach(time)) * CAUTION
+    def good(self, found: Lists, moved: float, time: float, step: int) -> bool:
+        """Whether lists of particles miss no pair after these have moved [m], or last longer."""
+        if not found.short or not math.isfinite(moved):
+            return False
+        if self.every:
+            return step - found.step < self.every
+        return 2 * moved <= (found.short_radius - self.reach(time)) * CAUTION
+
+    def short_radius(self, found: Lists, moved: float, time: float) -> float:
+        """Radius for lists of particles that are chosen now, after a way [m] since the build.
+
+        No wider than what all pairs within it are listed for; 0 where it is not worth while.
+        """
+        reach = self.reach(time)
+        if self.every or not math.isfinite(moved):
+            return 0.0
+        margin = SHORT * (found.radius - reach)
+        room = (found.radius - 2 * moved) * CAUTION - reach
+        return reach + min(margin, room) if room > margin / 2 > 0 else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,11 +11,11 @@ from numpy.typing import NDArray
 
 from motes.group.lasting import Body
 from motes.interact.arrange import Box
-from motes.jit import blocks, share
+from motes.jit import blocks, each
 from motes.state import Particles
 from motes.step import Stepper
 
-BLOCK = 1 << 14
+BLOCK = 1 << 15
 """Rows of one kernel call."""
 
 
@@ -25,6 +26,8 @@ class Bodies:
     name: str
     position: NDArray[Any]
     mass: NDArray[Any]
+    births: Callable[[], NDArray[np.int64]] = lambda: np.zeros((2, 0), np.int64)
+    """Gives which births they are (2, n): number of the stream of births, and k from 1 on."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,7 @@ class Member:
         """Run one of the system's staged kernels over all rows that were alive."""
         kernel = self.stepper.system.staged(name)
         columns, parts = (self.rows.birth, self.rows.columns), blocks(self.alive, BLOCK)
-        share(lambda k: kernel(self.y, *columns, self.push, *arguments, *parts[k]), len(parts))
+        each(kernel, (self.y, *columns, self.push, *arguments), parts)
 
     def body(self, time: float) -> Body:
         """The system as laws of limited reach see it."""

@@ -14,19 +14,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.compile.pairs import FORCE, LISTED, POTENTIAL, VIRIAL, Law
+from motes.compile.pairs import FORCE, POTENTIAL, VIRIAL, Law
+from motes.compile.text import AXES
 from motes.errors import SceneError, SimulationError
 from motes.group.lasting import Body, Class, Lasting, Lists
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, Packing, arrange, common_grid, wrapped
-from motes.interact.clusters import lists
-from motes.jit import blocks, share
+from motes.interact.clusters import Room, cluster_lists, particle_lists
+from motes.jit import Calls, blocks, each
+from motes.memory import allocate
 
 ALIKE = 1.5
 """Ratio of reaches up to which laws share lists."""
 
-ROWS = 1 << 14
+RECORDS = "records"
+"""Name of the places of all slots, x, y, z and a fourth number that nobody reads."""
+
+ROWS = 1 << 15
 """Rows of one task of a loop that is quick."""
+
+
+Packed = dict[str, dict[str, NDArray[Any]]]
+"""Columns by system and name, in the order of slots."""
 
 
 class Nearby:
@@ -128,11 +137,14 @@ class Nearby:
         memory.lists[k] = replace(settled, settled=True)
 
     def _build(self, k: int, bodies: dict[str, Body], memory: Lasting, step: int) -> None:
-        memory.lists[k] = replace(self.build(self.classes[k], bodies), step=step)
+        rooms = {pair: memory.rooms.setdefault((k, *pair), []) for pair in self.classes[k].pairs}
+        memory.lists[k] = replace(self.build(self.classes[k], bodies, rooms), step=step)
         memory.builds += 1
 
-    def build(self, shared: Class, bodies: dict[str, Body]) -> Lists:
-        """Lists for the laws of a class, of bodies as they are."""
+    def build(
+        self, shared: Class, bodies: dict[str, Body], rooms: dict[Any, Room] | None = None
+    ) -> Lists:
+        """Lists of clusters for the laws of a class, of bodies as they are, in rooms by pair."""
         time = next(iter(bodies.values())).time
         radius = shared.radius(time, self.periodic)
         positions = {}
@@ -145,9 +157,25 @@ class Nearby:
             positions[name] = position
         cut = common_grid(list(positions.values()), radius, self.periodic)
         arranged = {n: arrange(p, cut, radius, self.periodic) for n, p in positions.items()}
-        near = {(a, b): lists(arranged[a], arranged[b], cut, radius) for a, b in shared.pairs}
+        near = {}
+        for a, b in shared.pairs:
+            room = rooms[a, b] if rooms else []
+            near[a, b] = cluster_lists(arranged[a], arranged[b], cut, radius, room)
         kept = {name: _kept(bodies[name]) for name in shared.systems}
         return Lists(radius, arranged, near, kept)
+
+    def _chosen(
+        self, shared: Class, found: Lists, packed: Packed, radius: float, rooms: dict[Any, Room]
+    ) -> Lists:
+        """Lists with those of particles, within a radius [m] of where they are now."""
+        places = {name: packed[name][RECORDS] for name in shared.systems}
+        short = {}
+        for (a, b), lists in found.near.items():
+            room = rooms.setdefault((a, b), [])
+            parts = particle_lists(lists, places[a], places[b], radius, a == b, room)
+            short[a, b] = Calls(parts)
+        marks = {n: place[: found.arranged[n].order.size].copy() for n, place in places.items()}
+        return replace(found, short=short, marks=marks, short_radius=radius)
 
     # ------------------------------------------------------------------ sums
 
@@ -163,22 +191,42 @@ class Nearby:
             for law, _, _ in shared.laws:
                 if message := self._too_long(law, time):
                     raise SimulationError(message)
-            found = memory.lists[k]
-            moved = np.inf
-            if found is not None and _holds(found, shared.systems, bodies):
-                packed, moved = self._packed(shared, found, bodies)
-            if found is None or shared.stale(found, moved, time, memory.steps):
-                self._build(k, bodies, memory, memory.steps)
-                found = memory.lists[k]
-                assert found is not None
-                packed, _ = self._packed(shared, found, bodies)
+            found, packed = self._current(k, bodies, memory, time)
             for law, targets, sources in shared.laws:
                 self._push(law, targets, sources, time, found, packed, pushes)
 
+    def _current(
+        self, k: int, bodies: dict[str, Body], memory: Lasting, time: float
+    ) -> tuple[Lists, Packed]:
+        """Lists of a class that miss no pair now, built or shortened anew where they must be."""
+        shared, found = self.classes[k], memory.lists[k]
+        radius = 0.0
+        if found is not None and _holds(found, shared.systems, bodies):
+            packed, moved, since = self._packed(shared, found, bodies)
+            if shared.good(found, since, time, memory.steps):
+                return found, packed
+            radius = shared.short_radius(found, moved, time)
+            if not found.short and (shared.every or not moved):
+                radius = radius or found.radius  # They were built for this very place or step.
+        if not radius:
+            self._build(k, bodies, memory, memory.steps)
+            found = memory.lists[k]
+            assert found is not None
+            packed, _, _ = self._packed(shared, found, bodies)
+            radius = shared.short_radius(found, 0.0, time) or found.radius
+        assert found is not None
+        rooms = memory.rooms.setdefault((k,), {})
+        found = memory.lists[k] = self._chosen(shared, found, packed, radius, rooms)
+        return found, packed
+
     def _packed(
         self, shared: Class, found: Lists, bodies: dict[str, Body]
-    ) -> tuple[dict[str, dict[str, NDArray[Any]]], float]:
-        """What the laws read of every system in the order of slots; how far one has moved [m]."""
+    ) -> tuple[Packed, float, float]:
+        """What the laws read of every system in the order of slots; how far one has moved since the
+        lists were built, and since they were shortened [m].
+
+        Places come as records (slots + 1, 4), and, as the columns of these, one by one.
+        """
         wanted: dict[str, set[str]] = {name: set() for name in shared.systems}
         for law, targets, sources in shared.laws:
             own, other = law.fields
@@ -186,19 +234,17 @@ class Nearby:
                 wanted[name] |= set(own)
             for name in sources:
                 wanted[name] |= set(other)
-        packed, moved = {}, 0.0
+        packed: Packed = {}
+        moved = np.zeros(2)
         for name, body in bodies.items():
             if name not in wanted:
                 continue
             packing = Packing(found.arranged[name], self.periodic)
             size = found.arranged[name].slots + 1
-            position = self._space((name, "x"), (3, size))
-            moved = max(moved, packing.positions(body.position, position))
-            columns = dict(zip("xyz", position, strict=True))
-            for axis, then in enumerate(LISTED):
-                if then in wanted[name]:
-                    parts = found.arranged[name].real, found.arranged[name].ghosts
-                    columns[then] = np.concatenate([*(p.position[axis] for p in parts), [0]])
+            records = self._space((name, "x"), (size, 4))
+            mark = found.marks.get(name)
+            moved = np.maximum(moved, packing.positions(body.position, records, mark))
+            columns = {RECORDS: records, **dict(zip(AXES, records.T, strict=False))}
             for field_ in sorted(wanted[name] - set(columns)):
                 kept = found.columns.get((name, field_))
                 if kept is None:
@@ -212,55 +258,41 @@ class Nearby:
                         found.columns[name, field_] = room
                 columns[field_] = kept
             packed[name] = columns
-        return packed, float(np.sqrt(moved))
+        built, shortened_ = np.sqrt(moved).tolist()
+        return packed, built, shortened_
 
     def _space(self, key: Any, shape: tuple[int, ...]) -> NDArray[Any]:
         """Room that lasts for one evaluation."""
         size = int(np.prod(shape))
         room = self._room.get(key)
         if room is None or room.size < size:
-            room = self._room[key] = np.empty(size + size // 8, self.real)
+            room = allocate((size + size // 8,), self.real, "what neighbours are read from")
+            self._room[key] = room
         return room[:size].reshape(shape)
 
     def _summed(
         self, law: Law, what: str, target: str, sources: Iterable[str], time: float,
-        found: Lists, packed: dict[str, dict[str, NDArray[Any]]],
+        found: Lists, packed: Packed,
     ) -> NDArray[Any]:  # fmt: skip
         """Sums (numbers, n) over the neighbours of every particle of a target."""
         n = found.arranged[target].order.size
         out = self._space(("sums",), (law.sums(what), n))
         out[:] = 0
-        own, other = law.fields
+        own, other = law.fields[0], [name for name in law.fields[1] if name not in AXES]
         mine = tuple(packed[target][name] for name in own)
-        limit, listed = self.real(law.reach(time)) ** 2, self.real(found.radius) ** 2
+        limit = self.real(law.reach(time)) ** 2
         kernel = law.sweep(what)
         for source in sources:
             numbers = law.numbers(time, self.real, (target, source))
+            records = packed[source][RECORDS]
             theirs = tuple(packed[source][name] for name in other)
-            parts = found.near[target, source]
-
-            def sweep(
-                k: int,
-                numbers: Any = numbers,
-                theirs: Any = theirs,
-                parts: Any = parts,
-                source: str = source,
-            ) -> None:
-                part = parts[k]
-                room: NDArray[Any] = np.empty((len(other), part.longest), self.real)
-                best: NDArray[Any] = np.empty(max(law.nearest, 1), self.real)
-                pick = np.empty(max(law.nearest, 1), np.int64)
-                kernel(
-                    numbers, mine, theirs, *part[:3], source == target, limit, listed, room, best,
-                    pick, out,
-                )  # fmt: skip
-
-            share(sweep, len(parts))
+            head = numbers, mine, records, theirs, limit, out
+            each(kernel, head, found.short[target, source])
         return out
 
     def _push(
         self, law: Law, targets: Iterable[str], sources: Iterable[str], time: float,
-        found: Lists, packed: dict[str, dict[str, NDArray[Any]]],
+        found: Lists, packed: Packed,
         pushes: dict[str, NDArray[Any]],
     ) -> None:  # fmt: skip
         numbers = law.numbers(time, self.real)
@@ -268,8 +300,7 @@ class Nearby:
             sums = self._summed(law, law.summed, target, sources, time, found, packed)
             mine = tuple(packed[target][name] for name in law.fields[0])
             order, push = found.arranged[target].order, pushes[target]
-            parts = blocks(order.size, ROWS)
-            share(lambda k: law.finish(numbers, mine, sums, order, push, *parts[k]), len(parts))  # noqa: B023
+            each(law.finish, (numbers, mine, sums, order, push), blocks(order.size, ROWS))
 
     # ------------------------------------------------------------------ measures
 
@@ -292,7 +323,8 @@ class Nearby:
                 continue
             part = Class(chosen)
             found = self.build(part, bodies)
-            packed, _ = self._packed(part, found, bodies)
+            packed, _, _ = self._packed(part, found, bodies)
+            found = self._chosen(part, found, packed, found.radius, {})
             time = next(iter(bodies.values())).time
             for law, targets, sources in chosen:
                 for target in targets:

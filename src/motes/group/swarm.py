@@ -1,60 +1,95 @@
-"""Gathering laws without lists: particles in cells, all laws of a swarm in one loop.
-
-A swarm is a set of laws with one grid of cells, whose cells are as wide as the longest reach.
-"""
+"""Gathering laws without lists: particles in cells, laws that share their sources in one loop."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.compile.gather import WIDTH, gather_kernel, read
+from motes.compile.gather import LANES, Gathering
 from motes.compile.pairs import Law
-from motes.interact.arrange import Box, wrapped
-from motes.interact.cells import MOST_RUNS, Cells, Grid, grid, sort
+from motes.interact.arrange import Box
+from motes.interact.cells import Cells, Grid, sort
+from motes.interact.runs import inside, pick, rows_of_cells, rows_wanted
 from motes.jit import blocks, share
 
 ROWS = 1 << 15
 """Rows of one task of a loop that is quick."""
 
-TARGETS = 1 << 13
+MOST, LEAST = 1 << 13, 1 << 8
 """Targets of one task of sums."""
 
-FEWEST = 4
-"""Cells along a period below which images would be met twice."""
+ROOM = 512
+"""Points near a few targets that there is room for at first; it grows when there are more."""
+
+FEWEST = 5
+"""Longest reaches along a period below which images would be met twice."""
 
 UNTIDY = 1 << 12
 """Rows that two neighbours in a cell may be apart before rows had better move."""
+
+EVERY = 16
+"""Every so many rows are looked at to see whether they are tidy."""
 
 Array = NDArray[Any]
 Laws = Sequence[tuple[Law, tuple[str, ...], tuple[str, ...]]]
 
 
-def _room(points: int, fields: int, real: type) -> tuple[Array, ...]:
-    """Memory of one task: runs, slots, candidates, marks, choice, and the chosen."""
-    return (
-        np.empty((MOST_RUNS, 2), np.int64),
-        np.empty(points, np.uint32),
-        np.empty((3, points), real),
-        np.empty(points, np.uint8),
-        np.empty(points, np.uint32),
-        np.empty((fields, points), real),
-    )
+@dataclass(eq=False)
+class _Sorted:
+    """One system in the order of its cells."""
+
+    grid: Grid
+    cells: Cells
+    body: Any
+    columns: dict[str, Array] = field(default_factory=dict)
+
+    def column(self, key: str) -> Array:
+        """A number of every particle, with room for lanes beyond the last."""
+        if key in ("x", "y", "z"):
+            axis: Array = self.cells.position["xyz".index(key)]
+            return axis
+        if key not in self.columns:
+            row = self.cells.row
+            out = self.columns[key] = np.zeros(row.size + LANES, self.cells.position.dtype)
+            values, parts = self.body.column(key), blocks(row.size, ROWS)
+
+            def take(k: int) -> None:
+                rows = slice(*parts[k])
+                pick(values, row[rows], out[rows])
+
+            share(take, len(parts))
+        return self.columns[key]
+
+    @property
+    def untidy(self) -> bool:
+        """Whether many of those next to one another are far apart in memory."""
+        row = self.cells.row
+        apart = np.abs(row[1::EVERY] - row[:-1:EVERY]) > UNTIDY
+        return bool(4 * np.count_nonzero(apart) > apart.size)
 
 
 class Swarm:
-    """Evaluates gathering laws that share cells."""
+    """Evaluates gathering laws."""
 
     def __init__(self, laws: Laws, real: type, periodic: Box) -> None:
         self.laws, self.real, self.periodic = list(laws), real, periodic
         self.systems = sorted({n for _, targets, sources in laws for n in (*targets, *sources)})
-        self._kernels: dict[tuple[int, ...], Any] = {}
+        self._slots: Array = np.empty(0, np.int32)
+        self._room = ROOM
+        self._alike: list[tuple[Gathering, str, tuple[str, ...]]] = []
+        for target in self.systems:
+            felt: dict[tuple[str, ...], list[Law]] = {}
+            for law, targets, sources in self.laws:
+                if target in targets:
+                    felt.setdefault(sources, []).append(law)
+            self._alike += [(Gathering(some), target, sources) for sources, some in felt.items()]
 
     def fits(self, time: float) -> bool:
-        """Whether the periods hold enough cells."""
+        """Whether the periods are long enough."""
         reach = max(law.reach(time) for law, _, _ in self.laws)
         return bool(self.periodic.shortest >= FEWEST * reach * (1 + 1e-5))
 
@@ -63,117 +98,77 @@ class Swarm:
     ) -> None:
         """Add the laws' accelerations (3, n) [m/s2] to pushes; note whose rows are scattered."""
         time = next(iter(bodies.values())).time
-        positions = {name: self._inside(bodies[name]) for name in self.systems}
-        cut = self._grid(list(positions.values()), max(law.reach(time) for law, _, _ in self.laws))
-        cells = {name: sort(position, cut) for name, position in positions.items()}
-        for name, found in cells.items():
-            apart = np.abs(np.diff(found.row)) > UNTIDY
-            if 4 * np.count_nonzero(apart) > apart.size:
-                untidy.add(name)
-        packed: dict[tuple[str, str], Array] = {}
-        for target in self.systems:
-            acting = [one for one in self.laws if target in one[1]]
-            sources = sorted({name for _, _, names in acting for name in names})
-            if not acting or not cells[target].row.size:
-                continue
-            n = cells[target].row.size
-            sums: dict[int, Array] = {}
-            for law, _, _ in acting:
-                sums[id(law)] = np.zeros((law.sums(), n), self.real)
-            for source in sources:
-                felt = [law for law, _, names in acting if source in names]
-                part = self._gather(felt, target, source, cells, cut, bodies, packed, time)
-                place = 0
-                for law in felt:
-                    sums[id(law)] += part[place : place + law.sums()]
-                    place += law.sums()
-            for law, _, _ in acting:
-                self._finish(law, sums[id(law)], target, cells, bodies, packed, time, pushes)
+        swarm = {name: self._sorted(bodies[name]) for name in self.systems}
+        untidy |= {name for name, found in swarm.items() if found.untidy}
+        for gathering, target, sources in self._alike:
+            if swarm[target].cells.row.size:
+                some = [swarm[name] for name in sources]
+                self._gather(gathering, swarm[target], some, time, pushes[target])
 
     def order(self, body: Any) -> NDArray[np.int32]:
         """Rows of one system in the order of cells."""
-        position = self._inside(body)
-        reach = max(law.reach(body.time) for law, _, _ in self.laws)
-        return sort(position, self._grid([position], reach)).row
+        return self._sorted(body).cells.row
 
-    def _inside(self, body: Any) -> Array:
-        found: Array = np.array(body.position[:, : body.alive], self.real)
-        if not np.isfinite(found).all():
-            found = np.where(np.isfinite(found), found, 0).astype(self.real)
-        wrapped(found, self.periodic)
-        return found
+    def _sorted(self, body: Any) -> _Sorted:
+        """A system in cells for the longest of the reaches with which it feels itself, if any."""
+        name, time, n, real = body.name, body.time, body.alive, self.real
+        own = [law for law, targets, sources in self.laws if name in targets and name in sources]
+        reach = max(law.reach(time) for law in own or [law for law, _, _ in self.laws])
+        low: Array = self.periodic.low.astype(real)
+        size: Array = self.periodic.size.astype(real)
+        position: Array = np.empty((3, n), real)
+        parts = blocks(n, ROWS)
+        found: Array = np.zeros((max(len(parts), 1), 2, 3), real)
 
-    def _grid(self, positions: list[Array], reach: float) -> Grid:
-        """Cells that begin at the low corner of what there is, or of the box."""
-        inside = [p for p in positions if p.shape[1]]
-        low = np.min([p.min(axis=1) for p in inside], axis=0) if inside else np.zeros(3)
-        high = np.max([p.max(axis=1) for p in inside], axis=0) if inside else np.zeros(3)
-        size = self.periodic.size
-        box: Array = np.where(size > 0, size, np.inf).astype(self.real)
-        low = np.where(size > 0, 0.0, low)
-        cut = grid(np.stack([low, np.where(size > 0, size, high)]).astype(float), reach, box)
-        return cut._replace(low=np.where(size > 0, self.periodic.low, cut.low))
+        def take(k: int) -> None:
+            rows = slice(*parts[k])
+            inside(body.position[:, rows], low, size, position[:, rows], found[k])
 
-    def _column(
-        self, name: str, key: str, cells: Mapping[str, Cells], bodies: Mapping[str, Any],
-        packed: dict[tuple[str, str], Array],
-    ) -> Array:  # fmt: skip
-        """A number of every particle in the order of cells."""
-        if key in ("x", "y", "z"):
-            column: Array = cells[name].position["xyz".index(key)]
-            return column
-        if (name, key) not in packed:
-            values, row = bodies[name].column(key), cells[name].row
-            out = packed[name, key] = np.empty(row.size, self.real)
-            parts = blocks(row.size, ROWS)
-
-            def take(k: int) -> None:
-                rows = slice(*parts[k])
-                out[rows] = values[row[rows]]
-
-            share(take, len(parts))
-        return packed[name, key]
+        share(take, len(parts))
+        ends = [found[:, 0].min(axis=0), found[:, 1].max(axis=0)]
+        bounds = np.where(size > 0, [np.zeros(3), self.periodic.size], ends).astype(float)
+        box: Array = np.where(size > 0, size, np.inf).astype(real)
+        cut = rows_of_cells(bounds, reach, 1, box, self.periodic.low)
+        cells = sort(position, cut, LANES)
+        if (across := rows_wanted(cells.key)) > 1:
+            cut = rows_of_cells(bounds, reach, across, box, self.periodic.low)
+            cells = sort(position, cut, LANES)
+        return _Sorted(cut, cells, body)
 
     def _gather(
-        self, laws: list[Law], target: str, source: str, cells: Mapping[str, Cells], cut: Grid,
-        bodies: Mapping[str, Any], packed: dict[tuple[str, str], Array], time: float,
-    ) -> Array:  # fmt: skip
-        """Sums of some laws (numbers, targets) over one source."""
-        which = tuple(id(law) for law in laws)
-        if which not in self._kernels:
-            self._kernels[which] = gather_kernel(laws)
-        kernel, other = self._kernels[which], read(laws, 1)
-        mine = tuple(self._column(target, key, cells, bodies, packed) for key in read(laws, 0))
-        theirs = np.stack([self._column(source, key, cells, bodies, packed) for key in other])
-        numbers = tuple(law.numbers(time, self.real) for law in laws)
-        limits: Array = np.array([self.real(law.reach(time)) ** 2 for law in laws], self.real)
-        n = cells[target].row.size
-        out: Array = np.empty((sum(law.sums() for law in laws), n), self.real)
-        parts = blocks(n, TARGETS)
+        self, kernel: Gathering, target: _Sorted, sources: Sequence[_Sorted], time: float,
+        push: Array,
+    ) -> None:  # fmt: skip
+        """Add some laws' accelerations of a target; they all feel the same sources."""
+        n, real = target.cells.row.size, self.real
+        numbers = kernel.numbers(time, real)
+        mine = tuple(target.column(key) for key in kernel.own)
+        if self._slots.size < n + LANES:
+            self._slots = np.arange(2 * n + LANES, dtype=np.int32)
+        kept: Array = np.empty((kernel.sums, n + LANES if len(sources) > 1 else 0), real)
+        nobody = np.full(n + LANES if any(s is not target for s in sources) else 0, -1, np.int32)
+        parts = blocks(n, min(MOST, max(LEAST, -(-n // 8))))
 
         def sweep(k: int) -> None:
-            begin, end = parts[k]
-            points = 512
-            while begin < end:
-                room = _room(2 * points + WIDTH, len(other), self.real)
-                begin, points = kernel(
-                    numbers, limits, cut, mine, cells[target].key, theirs, cells[source],
-                    source == target, begin, end, room, out,
-                )  # fmt: skip
+            hold: Array = np.empty((max(kernel.sums, 3), LANES), real)
+            room = self._room
+            for source in sources:
+                slot = self._slots if source is target else nobody
+                theirs = tuple(source.column(key) for key in kernel.other)
+                begin, end = parts[k]
+                while begin < end:
+                    run: Array = np.empty((room, 2), np.int64)
+                    shift: Array = np.empty((room, 3), real)
+                    chosen: Array = np.empty(room, np.uint32)
+                    begin, needed = kernel(
+                        numbers, mine, slot, target.cells.key, int(target.grid.shape[0]), theirs,
+                        source.grid, source.cells, begin, end, run, shift, chosen, hold,
+                        source is not sources[0], source is sources[-1], kept,
+                        target.cells.row, push,
+                    )  # fmt: skip
+                    room = self._room = max(room, 2 * needed)
 
+        for source in sources:
+            for key in kernel.other:
+                source.column(key)
         share(sweep, len(parts))
-        return out
-
-    def _finish(
-        self, law: Law, sums: Array, target: str, cells: Mapping[str, Cells],
-        bodies: Mapping[str, Any], packed: dict[tuple[str, str], Array], time: float,
-        pushes: Mapping[str, Array],
-    ) -> None:  # fmt: skip
-        mine = tuple(self._column(target, key, cells, bodies, packed) for key in law.fields[0])
-        numbers, order = law.numbers(time, self.real), cells[target].row
-        parts = blocks(order.size, ROWS)
-
-        def finish(k: int) -> None:
-            law.finish(numbers, mine, sums, order, pushes[target], *parts[k])
-
-        share(finish, len(parts))

@@ -1,6 +1,7 @@
-"""Kennedy and Carpenter's fourth-order method (the implicit half): stiff problems, with estimate.
+"""Kennedy and Carpenter's fourth-order method: stiff problems, whole or only a stiff part of them.
 
-L-stable. C. A. Kennedy and M. H. Carpenter, Additive Runge-Kutta schemes for convection-diffusion-
+L-stable. With `stiff=g`, y' = f + g: g is taken implicitly, f explicitly (an additive
+pair). C. A. Kennedy and M. H. Carpenter, Additive Runge-Kutta schemes for convection-diffusion-
 reaction equations, Applied Numerical Mathematics 44 (2003) 139-181, ARK4(3)6L[2]SA.
 """
 
@@ -36,4 +37,27 @@ method = Implicit(
         61727 / 225920,
     ),
     low_order=3,
+    a_explicit=(
+        (),
+        (1 / 2,),
+        (13861 / 62500, 6889 / 62500),
+        (
+            -116923316275 / 2393684061468,
+            -2731218467317 / 15368042101831,
+            9408046702089 / 11113171139209,
+        ),
+        (
+            -451086348788 / 2902428689909,
+            -2682348792572 / 7519795681897,
+            12662868775082 / 11960479115383,
+            3355817975965 / 11060851509271,
+        ),
+        (
+            647845179188 / 3216320057751,
+            73281519250 / 8382639484533,
+            552539513391 / 3454668386233,
+            3354512671639 / 8306763924573,
+            4040 / 17871,
+        ),
+    ),
 )

@@ -38,11 +38,11 @@ class Alignment:
     def near(p, a, b, r):
         v = sqrt(a.vx * a.vx + a.vy * a.vy + a.vz * a.vz)
         ahead = -(a.vx * r.x + a.vy * r.y + a.vz * r.z)
-        seen = 1.0 if ahead >= p.edge * v * r.length else 0.0
-        w = seen * (1.0 - r.length * p.per_radius)
-        return w * (b.vx - a.vx), w * (b.vy - a.vy), w * (b.vz - a.vz), w
+        seen = ahead >= p.edge * v * r.length
+        w = 1.0 - r.length * p.per_radius if seen else 0.0
+        return w * b.vx, w * b.vy, w * b.vz, w
 
     @kernel
     def acceleration(p, a, s):
         k = p.rate / (s[3] + 0.05)
-        return k * s[0], k * s[1], k * s[2]
+        return k * (s[0] - s[3] * a.vx), k * (s[1] - s[3] * a.vy), k * (s[2] - s[3] * a.vz)

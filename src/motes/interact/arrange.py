@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.interact.cells import Cells, Grid, grid, sort
-from motes.jit import STRICT, blocks, jit, share
+from motes.jit import STRICT, blocks, each, jit, share
 
-FINER = 1.6
-"""Cells per reach: finer ones make compact clusters, but there are more of them to look into."""
+FINER = np.array([4.0, 1.0, 1.0])
+"""Cells per reach along each axis: what is near is in nine rows of cells along x, of which short
+pieces are enough."""
 
 CLUSTER = 8
 """Most particles of a cluster."""
@@ -27,7 +28,7 @@ SMALLEST_PART = 1 << 11
 LARGEST_PART = 1 << 14
 """Particles of one task."""
 
-ROWS = 1 << 14
+ROWS = 1 << 15
 """Slots of one task of a loop that is quick."""
 
 
@@ -42,7 +43,7 @@ class Box(NamedTuple):
     @property
     def shortest(self) -> float:
         """The shortest period, infinite where there is none [m]."""
-        return float(np.min(np.where(self.size > 0, self.size, np.inf)))
+        return min((s for s in self.size.tolist() if s > 0), default=float("inf"))
 
 
 OPEN = Box(np.zeros(3), np.zeros(3))
@@ -58,8 +59,10 @@ class Arranged(NamedTuple):
     ghosts: Cells
     ghost_of: NDArray[np.int32]
     """(g,) slots of the particles that ghosts are images of."""
+    image: NDArray[np.uint8]
+    """(g,) which of the 27 periodic boxes around a ghost is in."""
     shift: NDArray[Any]
-    """(3, g) from a particle to its image [m]."""
+    """(27, 3) ways from a particle to its images in the boxes around, itself in the middle [m]."""
     inner: NDArray[np.float64]
     """(2, 3) the box's lowest and highest coordinates; ghosts are outside [m]."""
     clusters: list[NDArray[np.int32]]
@@ -72,20 +75,29 @@ class Arranged(NamedTuple):
 
 
 @jit(flags=STRICT)
-def wrap(x: Any, low: Any, size: Any) -> None:
+def _wrap(position: Any, low: Any, size: Any, begin: Any, end: Any) -> None:
     """Take coordinates into [low, low + size), in place."""
-    for i in range(x.size):
-        away = x[i] - low
-        if not (0 <= away < size):
-            value = x[i] - size * np.floor(away / size)
-            x[i] = value if low <= value < low + size else low
+    for axis in range(3):
+        first, length = low[axis], size[axis]
+        if length > 0:
+            x = position[axis][begin:end]
+            outside = 0
+            for i in range(x.size):  # Counting is vector instructions.
+                away = x[i] - first
+                outside += (away < 0) | (away >= length)
+            for i in range(x.size if outside else 0):
+                away = x[i] - first
+                if not (0 <= away < length):
+                    value = x[i] - length * np.floor(away / length)
+                    x[i] = value if first <= value < first + length else first
 
 
-def wrapped(position: NDArray[Any], periodic: Box) -> None:
-    """Take positions (3, n) [m] into the box, in place."""
-    real, axes = position.dtype.type, np.flatnonzero(periodic.size)
-    low, size = periodic.low.astype(real), periodic.size.astype(real)
-    share(lambda k: wrap(position[axes[k]], low[axes[k]], size[axes[k]]), len(axes))
+def wrapped(position: NDArray[Any], periodic: Box, count: int | None = None) -> None:
+    """Take the first positions (3, n) [m], or all, into the box, in place."""
+    if periodic.size.any():
+        real = position.dtype.type
+        head = position, periodic.low.astype(real), periodic.size.astype(real)
+        each(_wrap, head, blocks(position.shape[1] if count is None else count, ROWS))
 
 
 def common_grid(positions: list[NDArray[Any]], reach: float, periodic: Box) -> Grid:
@@ -102,25 +114,92 @@ def common_grid(positions: list[NDArray[Any]], reach: float, periodic: Box) -> G
 def arrange(position: NDArray[Any], cut: Grid, reach: float, periodic: Box) -> Arranged:
     """Arrange particles (3, n) that lie within the box, with ghosts up to `reach` outside [m]."""
     real = sort(position, cut)
-    slots = np.arange(position.shape[1], dtype=np.int32)
-    shift = np.zeros((3, slots.size), position.dtype)
-    for axis in np.flatnonzero(periodic.size):
-        low, size = periodic.low[axis], periodic.size[axis]
-        x = real.position[axis][slots]
-        left, right = np.flatnonzero(x < low + reach), np.flatnonzero(x >= low + size - reach)
-        chosen = np.concatenate([np.arange(slots.size), left, right])
-        slots, shift = slots[chosen], shift[:, chosen]
-        whole = chosen.size - left.size - right.size
-        shift[axis, whole : whole + left.size] = size
-        shift[axis, whole + left.size :] = -size
-    slots, shift = slots[real.row.size :], shift[:, real.row.size :]
-    ghosts = sort(real.position[:, slots] + shift, cut)
-    clusters = _clusters(real, cut, reach)
-    ghost_of = slots[ghosts.row]
+    shift = _boxes(periodic).astype(position.dtype)
+    place, of, image = _ghosts(real.position, reach, periodic, shift)
+    ghosts = sort(place, cut)
     edges = np.where(
         periodic.size > 0, [periodic.low, periodic.low + periodic.size], [[-np.inf], [np.inf]]
     )
-    return Arranged(real.row, real, ghosts, ghost_of, shift[:, ghosts.row], edges, clusters)
+    clusters = _clusters(real, cut, reach)
+    of, image = of[ghosts.row], image[ghosts.row]
+    return Arranged(real.row, real, ghosts, of, image, shift, edges, clusters)
+
+
+def _ghosts(
+    position: NDArray[Any], reach: float, periodic: Box, shift: NDArray[Any]
+) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[np.uint8]]:
+    """Places (3, g) of images beyond the borders, of whom they are images, and in which box."""
+    parts = blocks(position.shape[1], ROWS)
+    low, size = periodic.low, periodic.size
+    borders = np.stack([low + reach, low + size - reach])
+    counts = np.zeros(len(parts) + 1, np.int64)
+
+    def count(k: int) -> None:
+        counts[k + 1] = _count_images(position, borders, size, *parts[k])
+
+    share(count, len(parts) if size.any() else 0)
+    ends = np.cumsum(counts)
+    place = np.empty((3, int(ends[-1])), position.dtype)
+    of, image = np.empty(place.shape[1], np.int32), np.empty(place.shape[1], np.uint8)
+    share(
+        lambda k: _write_images(
+            position, borders, size, shift, *parts[k], int(ends[k]), place, of, image
+        ),
+        len(parts) if place.size else 0,
+    )
+    return place, of, image
+
+
+def _boxes(periodic: Box) -> NDArray[np.float64]:
+    """Ways (27, 3) from a particle to its images in the boxes around [m]; box 13 is its own."""
+    steps = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(27, 3)
+    found: NDArray[np.float64] = steps * periodic.size
+    return found
+
+
+@jit(inline=True)
+def _sides(x: Any, border: Any, period: Any, axis: Any) -> Any:
+    """The first and the last of -1, 0, 1 by which a coordinate has images along an axis."""
+    if not period[axis] > 0:
+        return 0, 0
+    return (
+        -1 if x >= border[1, axis] else 0,
+        1 if x < border[0, axis] else 0,
+    )
+
+
+@jit(flags=STRICT)
+def _count_images(position: Any, border: Any, period: Any, begin: Any, end: Any) -> Any:
+    total = 0
+    for i in range(begin, end):
+        images = 1
+        for axis in range(3):
+            first, last = _sides(position[axis, i], border, period, axis)
+            images *= last - first + 1
+        total += images - 1
+    return total
+
+
+@jit(flags=STRICT)
+def _write_images(
+    position: Any, border: Any, period: Any, shift: Any, begin: Any, end: Any, new: Any,
+    place: Any, of: Any, image: Any,
+) -> None:  # fmt: skip
+    for i in range(begin, end):
+        x, y, z = position[0, i], position[1, i], position[2, i]
+        x0, x1 = _sides(x, border, period, 0)
+        y0, y1 = _sides(y, border, period, 1)
+        z0, z1 = _sides(z, border, period, 2)
+        for a in range(x0, x1 + 1):
+            for b in range(y0, y1 + 1):
+                for c in range(z0, z1 + 1):
+                    k = 9 * a + 3 * b + c + 13
+                    if k != 13:
+                        place[0, new] = x + shift[k, 0]
+                        place[1, new] = y + shift[k, 1]
+                        place[2, new] = z + shift[k, 2]
+                        of[new], image[new] = np.int32(i), np.uint8(k)
+                        new += 1
 
 
 def part_size(n: int) -> int:
@@ -130,17 +209,19 @@ def part_size(n: int) -> int:
 
 def _clusters(cells: Cells, cut: Grid, reach: float) -> list[NDArray[np.int32]]:
     n = cells.row.size
-    found = []
-    for begin, end in blocks(n, part_size(n)):
-        room = np.empty(end - begin + 1, np.int32)
-        found.append(
-            room[: _cut(cells.key, cells.position[0], cut.shape[0], reach, begin, end, room)]
-        )
-    return found
+    parts = blocks(n, part_size(n))
+    rooms = [np.empty(end - begin + 1, np.int32) for begin, end in parts]
+    counts = np.zeros(len(parts), np.int64)
+    head = cells.key, cells.position[0], cut.shape[0], reach, counts
+    each(_cut, head, [(k, *part, rooms[k]) for k, part in enumerate(parts)])
+    return [room[:count] for room, count in zip(rooms, counts.tolist(), strict=True)]
 
 
 @jit(flags=STRICT)
-def _cut(key: Any, x: Any, along: Any, wide: Any, begin: Any, end: Any, first: Any) -> Any:
+def _cut(
+    key: Any, x: Any, along: Any, wide: Any, counts: Any, part: Any, begin: Any, end: Any,
+    first: Any,
+) -> None:  # fmt: skip
     """Begin a cluster where one is full, a row of cells ends, or it would be wider than `wide`."""
     number, start, row = 0, begin, np.int64(-1)
     left = right = x.dtype.type(0)
@@ -152,7 +233,7 @@ def _cut(key: Any, x: Any, along: Any, wide: Any, begin: Any, end: Any, first: A
             first[number] = i
             number, start, row, left, right = number + 1, i, own, x[i], x[i]
     first[number] = end
-    return number + 1
+    counts[part] = number + 1
 
 
 class Packing(NamedTuple):
@@ -161,26 +242,29 @@ class Packing(NamedTuple):
     arranged: Arranged
     periodic: Box
 
-    def positions(self, position: NDArray[Any], out: NDArray[Any]) -> float:
-        """Fill (3, slots + 1) from positions (3, rows), as images near where they were arranged.
+    def positions(
+        self, position: NDArray[Any], out: NDArray[Any], mark: NDArray[Any] | None = None
+    ) -> NDArray[np.float64]:
+        """Fill (slots + 1, 4) from positions (3, rows): images near where they were arranged.
 
-        Returns the square of the longest way that one has gone [m2]. The last slot is a place far
-        from everything, to fill lists up with.
+        Returns the squares of the longest ways that one has gone since it was arranged, and since
+        it was at its `mark` (n, 4) [m2]. The last slot is a place far from everything, to fill
+        lists up with.
         """
         arranged = self.arranged
+        n = arranged.order.size
         size = self.periodic.size.astype(out.dtype)
-        parts = blocks(arranged.slots, ROWS)
-        moved = np.zeros(len(parts) + 1)
-
-        def pack(k: int) -> None:
-            moved[k] = _pack(
-                position, arranged.order, arranged.ghost_of, arranged.real.position,
-                arranged.shift, size, out, *parts[k],
-            )  # fmt: skip
-
-        share(pack, len(parts))
-        out[:, -1] = FAR
-        return float(moved.max())
+        parts, images = blocks(n, ROWS), blocks(arranged.ghost_of.size, ROWS)
+        moved = np.zeros((len(parts) + 1, 2))
+        if mark is None:
+            mark = np.empty((0, 4), out.dtype)
+        head = position, arranged.order, arranged.real.position, size, mark, out, moved
+        each(_pack, head, [(k, *part) for k, part in enumerate(parts)])
+        of, image = arranged.ghost_of, arranged.image
+        each(_pack_images, (out, of, image, arranged.shift, n), images)
+        out[-1] = FAR
+        farthest: NDArray[np.float64] = moved.max(axis=0)
+        return farthest
 
     def values(self, values: NDArray[Any], out: NDArray[Any]) -> None:
         """Fill (slots + 1,) from values (rows,)."""
@@ -196,26 +280,39 @@ FAR = 1e15
 
 @jit
 def _pack(
-    position: Any, order: Any, ghost_of: Any, then: Any, shift: Any, size: Any, out: Any,
+    position: Any, order: Any, then: Any, size: Any, mark: Any, out: Any, moved: Any, part: Any,
     begin: Any, end: Any,
-) -> Any:  # fmt: skip
-    most = out.dtype.type(0)
-    n = order.size
-    for i in range(begin, end):
-        slot = np.uint64(i if i < n else ghost_of[i - n])
-        row = np.uint64(order[slot])
-        away2 = out.dtype.type(0)
+) -> None:  # fmt: skip
+    most = far = out.dtype.type(0)
+    marked = mark.shape[0] > 0
+    for i in range(np.uint64(begin), np.uint64(end)):
+        row = np.uint64(order[i])
+        away2, since2 = out.dtype.type(0), out.dtype.type(0)
         for axis in range(3):
-            x, old = position[axis, row], then[axis, slot]
+            x, old = position[axis, row], then[axis, i]
             away, period = x - old, size[axis]
             if period > 0 and abs(away) > period / 2:
                 turns = period * np.round(away / period)
                 x, away = x - turns, away - turns
-            out[axis, i] = x if i < n else x + shift[axis, i - n]
+            out[i, axis] = x
             away2 += away * away
+            if marked:
+                since2 += (x - mark[i, axis]) ** 2
+        out[i, 3] = 0
         if not away2 <= most:
             most = away2  # Not a number counts as far.
-    return most
+        if not since2 <= far:
+            far = since2
+    moved[part, 0], moved[part, 1] = most, far
+
+
+@jit
+def _pack_images(out: Any, of: Any, image: Any, shift: Any, n: Any, begin: Any, end: Any) -> None:
+    for g in range(np.uint64(begin), np.uint64(end)):
+        i, k, to = np.uint64(of[g]), np.uint64(image[g]), np.uint64(n) + g
+        for axis in range(3):
+            out[to, axis] = out[i, axis] + shift[k, axis]
+        out[to, 3] = 0
 
 
 @jit

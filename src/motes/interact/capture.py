@@ -34,17 +34,30 @@ class Capture:
         p: Any, hunters: Sequence[Animals], prey: Sequence[Animals], luck: Any, step: float
     ) -> list[Any]:
         """(hunter, its rows, prey, its rows) of those that are caught in a step of a length [s]."""
-        from motes.neighbours import nearest
-
         found = []
         for victims in prey:
             for hunter in hunters:
-                if not victims.position.size or not hunter.position.size:
-                    continue
-                index, far = nearest(victims.position.T, 1, targets=hunter.position.T)
-                drawn = luck(hunter.ids, victims.ids[index[:, 0]])
-                caught = (far[:, 0] <= p.radius) & (drawn < -np.expm1(-p.rate * step))
-                near = np.flatnonzero(caught)
-                rows, first = np.unique(index[near, 0], return_index=True)
-                found.append((hunter.name, near[first], victims.name, rows))
+                i, j = _nearest(hunter.position, victims.position, p.radius)
+                drawn = luck(hunter.ids[i], victims.ids[j])
+                caught = np.flatnonzero(drawn < -np.expm1(-p.rate * step))
+                rows, first = np.unique(j[caught], return_index=True)
+                found.append((hunter.name, i[caught][first], victims.name, rows))
         return found
+
+
+def _nearest(hunters: Any, prey: Any, radius: float) -> tuple[Any, Any]:
+    """Rows of hunters (3, m) with prey (3, n) within a radius [m], and of each one's nearest."""
+    from motes.neighbours import within
+
+    nobody = np.zeros(0, np.int64)
+    if not hunters.size:
+        return nobody, nobody
+    low, high = hunters.min(axis=1) - radius, hunters.max(axis=1) + radius
+    around = np.flatnonzero(((low <= prey.T) & (high >= prey.T)).all(axis=1))
+    if not around.size:
+        return nobody, nobody
+    i, found = within(prey[:, around].T, radius, targets=hunters.T)
+    j = around[found]
+    order = np.lexsort((j, np.square(hunters[:, i] - prey[:, j]).sum(axis=0), i))
+    first = order[np.unique(i[order], return_index=True)[1]]
+    return i[first], j[first]

@@ -125,8 +125,12 @@ def columns(
     return position, np.stack([bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)])
 
 
-def grid(bounds: NDArray[np.float64], radius: float, box: NDArray[Any]) -> Grid:
+def grid(
+    bounds: NDArray[np.float64], radius: float | NDArray[np.float64], box: NDArray[Any]
+) -> Grid:
     """Cells for a search within `radius` [m] of points within `bounds` (2, 3) [m].
+
+    With three radii cells have these widths along the axes.
 
     Cells are wider than the radius by what rounding can move: distances, also across a border,
     which round with the box, and this calculation. An open axis that would have more than 2^20
@@ -187,8 +191,8 @@ def _index(key: Any, begin: Any, shift: Any, last: Any, first: Any) -> None:
         first[entry:] = begin + key.size - skipped
 
 
-def sort(position: NDArray[Any], grid: Grid) -> Cells:
-    """The points (3, n) in the order of (cell, row)."""
+def sort(position: NDArray[Any], grid: Grid, spare: int = 0) -> Cells:
+    """The points (3, n) in the order of (cell, row), with room for some more behind them."""
     n = position.shape[1]
     parts = blocks(n, ROWS)
     key = np.empty(n, np.uint64)
@@ -203,7 +207,7 @@ def sort(position: NDArray[Any], grid: Grid) -> Cells:
     key, row = sorted_rows(key, bits)
     shift = max(0, bits - (_ENTRIES * max(n, 1)).bit_length())
     first = np.zeros(((total - 1) >> shift) + 2, np.int32)
-    ordered = np.empty_like(position)
+    ordered = np.zeros((3, n + spare), position.dtype)
 
     def index(part: int) -> None:
         begin, end = parts[part]

@@ -1,51 +1,63 @@
-"""Lists of neighbours of clusters: every slot within a radius of any of a cluster's particles.
+"""Lists of neighbours: of clusters, whoever may be near any of their particles, and of particles.
 
-The particles of a cluster share a list, so that its neighbours are gathered once into consecutive
-memory and every particle's sum over them is a loop of vector instructions.
+Lists of clusters are short, and sought in cells; from them every particle takes its own, often,
+since these hold hardly more than what is within reach. Lists are filled up with nobody to whole
+vectors, so that loops over them are vector instructions without a rest. After Páll and Hess,
+Computer Physics Communications 184 (2013) 2641.
 """
 
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.interact.arrange import Arranged
+from motes.interact.arrange import CLUSTER, FAR, Arranged
 from motes.interact.cells import Grid
-from motes.jit import STRICT, jit, share
+from motes.jit import STRICT, each, jit
+from motes.machine.shuffles import LANES, near_slots, taken_apart
 from motes.memory import allocate
-
-WIDTH = 16
-"""Lists are filled up to a multiple of this: loops over them have no rest."""
 
 
 class Part(NamedTuple):
-    """The lists of consecutive clusters."""
+    """The lists of consecutive particles."""
 
-    cluster: NDArray[np.int32]
-    """(k + 1,) slots at which the clusters begin and, last, end."""
+    begin: int
+    """Slot of the first particle."""
     first: NDArray[np.int64]
-    """(k + 1,) where their lists begin in `entry` and, last, end."""
+    """(k + 1,) where their lists begin in `entry` and, last, end, divided by `LANES`."""
     entry: NDArray[np.int32]
     """Slots of neighbours; the slot after the last stands for nobody."""
     longest: int
     """Length of the longest list."""
 
 
-class _Room(NamedTuple):
+class Clusters(NamedTuple):
+    """The lists of consecutive clusters."""
+
+    cluster: NDArray[np.int32]
+    """(k + 1,) slots at which the clusters begin and, last, end."""
+    first: NDArray[np.int64]
+    entry: NDArray[np.int32]
+    longest: int
+
+
+Room = list[NDArray[np.int32]]
+"""Memory for entries of consecutive parts, to be used again for lists that replace those in it."""
+
+
+class _Candidates(NamedTuple):
     """Candidates of one cluster."""
 
     position: NDArray[Any]
     slot: NDArray[np.int32]
-    hit: NDArray[np.int32]
 
 
-def _room(points: int, real: Any) -> _Room:
-    return _Room(
-        np.empty((3, points), real), np.empty(points, np.int32), np.empty(points, np.int32)
-    )
+def _candidates(points: int, real: Any) -> _Candidates:
+    return _Candidates(np.zeros((3, points), real), np.empty(points, np.int32))
 
 
 @jit(inline=True, flags=STRICT)
@@ -127,44 +139,47 @@ def _collect(
     return points
 
 
+@jit(inline=True, flags=STRICT)
+def _to_box(low: Any, high: Any, x: Any) -> None:
+    """Replace coordinates by what lies between them and an interval."""
+    zero = x.dtype.type(0)
+    for q in range(x.size):
+        x[q] = max(max(low - x[q], x[q] - high), zero)
+
+
 @jit(flags=STRICT)
 def _seek(
-    position: Any,
-    cluster: Any,
-    cells: Any,
-    ghosts: Any,
-    grid: Any,
-    inner: Any,
-    radius: Any,
-    begin: Any,
-    room: Any,
-    first: Any,
-    entry: Any,
-) -> Any:
-    """Append lists of clusters from `begin` on; returns the first without, and room it needs."""
+    position: Any, cells: Any, ghosts: Any, grid: Any, inner: Any, radius: Any, state: Any,
+    part: Any, cluster: Any, room: Any, first: Any, entry: Any,
+) -> None:  # fmt: skip
+    """Append lists of a part's clusters; `state` holds the first without, and what that needs."""
     real = position.dtype.type
-    limit = real(radius) * real(radius)
     wide = radius * (1 + 2.0**-18)
+    limit, nought = real(wide) * real(wide), real(0)
     n = cells.key.size
-    nobody = np.int32(n + ghosts.key.size)
+    nobody, no_one = np.int32(n + ghosts.key.size), np.int32(-1)
+    far = real(FAR)
     xs, ys, zs = position[0], position[1], position[2]
     cx, cy, cz = cells.position[0], cells.position[1], cells.position[2]
     gx, gy, gz = ghosts.position[0], ghosts.position[1], ghosts.position[2]
     cell_key, cell_table, cell_shift = cells.key, cells.first, cells.shift
     ghost_key, ghost_table, ghost_shift = ghosts.key, ghosts.first, ghosts.shift
     rx, ry, rz = room.position[0], room.position[1], room.position[2]
-    slot, hits = room.slot, room.hit
-    for c in range(begin, cluster.size - 1):
+    slots = room.slot
+    for c in range(state[part, 0], cluster.size - 1):
         a, b = cluster[c], cluster[c + 1]
-        low = (np.float64(xs[a]), np.float64(ys[a]), np.float64(zs[a]))
-        high = low
+        x0 = x1 = xs[a]
+        y0 = y1 = ys[a]
+        z0 = z1 = zs[a]
         for i in range(a + 1, b):
-            x, y, z = np.float64(xs[i]), np.float64(ys[i]), np.float64(zs[i])
-            low = (min(low[0], x), min(low[1], y), min(low[2], z))
-            high = (max(high[0], x), max(high[1], y), max(high[2], z))
+            x0, x1 = min(x0, xs[i]), max(x1, xs[i])
+            y0, y1 = min(y0, ys[i]), max(y1, ys[i])
+            z0, z1 = min(z0, zs[i]), max(z1, zs[i])
+        low = (np.float64(x0), np.float64(y0), np.float64(z0))
+        high = (np.float64(x1), np.float64(y1), np.float64(z1))
         points = _collect(
             low, high, wide, grid, cx, cy, cz, cell_key, cell_table, cell_shift, np.int64(0),
-            np.int64(0), rx, ry, rz, slot,
+            np.int64(0), rx, ry, rz, slots,
         )  # fmt: skip
         alone = True
         for axis in range(3):
@@ -172,64 +187,130 @@ def _seek(
         if not alone:
             points = _collect(
                 low, high, wide, grid, gx, gy, gz, ghost_key, ghost_table, ghost_shift, n,
-                points, rx, ry, rz, slot,
+                points, rx, ry, rz, slots,
             )  # fmt: skip
-        total = first[c]
-        if points > slot.size or total + points + WIDTH > entry.size:
-            return c, points
-        hit = hits[:points]
-        hit[:] = np.int32(0)
+        size = (points + LANES - 1) // LANES * LANES
+        total = LANES * first[c]
+        if size > slots.size or total + size + LANES > entry.size:
+            state[part, 0], state[part, 1] = c, size
+            return
+        for q in range(points, size):
+            rx[q], slots[q] = far, nobody
+        px, py, pz = rx[:size], ry[:size], rz[:size]
+        _to_box(x0, x1, px)
+        _to_box(y0, y1, py)
+        _to_box(z0, z1, pz)
+        out = entry[total:]
+        found = near_slots(nought, nought, nought, limit, no_one, px, py, pz, slots[:size], out)
+        full = (found + LANES - 1) // LANES * LANES
+        for q in range(found, full):
+            out[q] = nobody
+        first[c + 1] = (total + full) // LANES
+    state[part, 0] = cluster.size - 1
+
+
+@jit(flags=STRICT)
+def _choose(
+    own: Any, others: Any, limit: Any, itself: Any, state: Any, part: Any, cluster: Any,
+    near_first: Any, near: Any, room: Any, first: Any, entry: Any,
+) -> None:  # fmt: skip
+    """Append lists of the particles of a part's clusters, of what is within a square of a distance;
+    `state` as for `_seek`."""
+    nobody = np.int32(others.shape[0] - 1)
+    for c in range(state[part, 0], cluster.size - 1):
+        a, b = cluster[c], cluster[c + 1]
+        slot = near[LANES * near_first[c] : LANES * near_first[c + 1]]
+        total = LANES * first[a - cluster[0]]
+        if total + (b - a) * (slot.size + LANES) > entry.size:
+            state[part, 0], state[part, 1] = c, slot.size
+            return
+        place = room.position
+        xs, ys, zs = place[0][: slot.size], place[1][: slot.size], place[2][: slot.size]
+        taken_apart(others, slot, xs, ys, zs)
         for i in range(a, b):
-            x, y, z = xs[i], ys[i], zs[i]
-            for q in range(hit.size):
-                dx, dy, dz = x - rx[q], y - ry[q], z - rz[q]
-                hit[q] |= np.int32(dx * dx + dy * dy + dz * dz <= limit)
-        new = np.uint64(total)
-        for q in range(hit.size):
-            entry[new] = slot[q]
-            new += np.uint64(hit[q])
-        while (new - np.uint64(total)) % np.uint64(WIDTH):
-            entry[new] = nobody
-            new += np.uint64(1)
-        first[c + 1] = np.int64(new)
-    return cluster.size - 1, np.int64(0)
+            me = np.int32(i) if itself else np.int32(-1)
+            out = entry[total:]
+            x, y, z = own[i, 0], own[i, 1], own[i, 2]
+            found = near_slots(x, y, z, limit, me, xs, ys, zs, slot, out)
+            full = (found + LANES - 1) // LANES * LANES
+            for q in range(found, full):
+                out[q] = nobody
+            total += full
+            first[i - cluster[0] + 1] = total // LANES
+    state[part, 0] = cluster.size - 1
 
 
-def lists(
-    targets: Arranged,
-    sources: Arranged,
-    cut: Grid,
-    radius: float,
-    old: list[Part] | None = None,
-) -> list[Part]:
-    """Every cluster's neighbours among the sources within `radius` [m], itself among them.
+def cluster_lists(
+    targets: Arranged, sources: Arranged, cut: Grid, radius: float, room: Room
+) -> list[Clusters]:
+    """Slots of the sources within `radius` [m] of any of a cluster's particles, and some others.
 
-    Lists go into the memory of `old` ones where that is large enough.
+    Entries go into `room` where that is large enough.
     """
-    position = targets.real.position
-    real = position.dtype.type
-    parts: list[Any] = [None] * len(targets.clusters)
+    real = targets.real.position.dtype.type
+    head = (
+        targets.real.position, sources.real, sources.ghosts, cut, sources.inner, float(radius)
+    )  # fmt: skip
+    work = []
+    for k, cluster in enumerate(targets.clusters):
+        first, entry = np.zeros(cluster.size, np.int64), _again(room, k, 400 * cluster.size)
+        work.append((k, cluster, _candidates(1024, real), first, entry))
+    done = _carried_out(_seek, head, work, room)
+    return [Clusters(one[1], one[3], one[4], _longest(one[3])) for one in done]
 
-    def seek(k: int) -> None:
-        cluster = targets.clusters[k]
-        first = np.zeros(cluster.size, np.int64)
-        given = old[k].entry if old and k < len(old) else None
-        entry = np.empty(32 * (cluster[-1] - cluster[0] + 1), np.int32) if given is None else given
-        room, begin = _room(1024, real), 0
-        while begin < cluster.size - 1:
-            begin, points = _seek(
-                position, cluster, sources.real, sources.ghosts, cut, sources.inner, float(radius),
-                begin, room, first, entry,
-            )  # fmt: skip
-            if points > room.slot.size:
-                room = _room(2 * points, real)
-            if first[begin] + points + WIDTH > entry.size:
-                share_done = (begin + 1) / (cluster.size - 1)
-                size = int(1.2 * (first[begin] + points + WIDTH) / min(share_done, 1.0))
-                larger = allocate((size,), np.int32, "a list of neighbours")
-                larger[: first[begin]] = entry[: first[begin]]
-                entry = larger
-        parts[k] = Part(cluster, first, entry, int(np.diff(first).max(initial=1)))
 
-    share(seek, len(parts))
-    return parts
+def particle_lists(
+    lists: Sequence[Clusters], own: NDArray[Any], others: NDArray[Any], radius: float,
+    itself: bool, room: Room,
+) -> list[Part]:  # fmt: skip
+    """Each particle's neighbours within `radius` [m] of places (slots + 1, 4), without itself.
+
+    `itself` says that particles are among the others; entries go into `room` as before.
+    """
+    real = own.dtype.type
+    work = []
+    for k, (cluster, near_first, near, longest) in enumerate(lists):
+        many = int(cluster[-1] - cluster[0])
+        first, entry = np.zeros(many + 1, np.int64), _again(room, k, 96 * many)
+        places = _candidates(longest, real)
+        work.append((k, cluster, near_first, near, places, first, entry))
+    done = _carried_out(_choose, (own, others, real(radius) ** 2, itself), work, room)
+    return [Part(int(one[1][0]), one[5], one[6], _longest(one[5])) for one in done]
+
+
+def _again(room: Room, k: int, likely: int) -> NDArray[np.int32]:
+    """Memory for a part's entries: that of before, if there is any."""
+    return room[k] if k < len(room) else np.empty(likely + 4096, np.int32)
+
+
+def _longest(first: NDArray[np.int64]) -> int:
+    return LANES * int(np.diff(first).max(initial=1))
+
+
+def _carried_out(kernel: Any, head: Any, work: list[Any], room: Room) -> list[Any]:
+    """Let a kernel fill the lists of all parts, with more room for those that need it."""
+    state = np.zeros((len(work), 2), np.int64)
+    waiting = work
+    while waiting:
+        each(kernel, (*head, state), waiting)
+        waiting = [one for one in work if state[one[0], 0] < one[1].size - 1]
+        for one in waiting:
+            work[one[0]] = _wider(one, *state[one[0]].tolist())
+        waiting = [work[one[0]] for one in waiting]
+    room[:] = [one[-1] for one in work]
+    return work
+
+
+def _wider(one: Any, begin: int, points: int) -> Any:
+    """A part's work with room to go on from a cluster that has so many candidates."""
+    cluster, places, first, entry = one[1], *one[-3:]
+    if points > places.slot.size:
+        places = _candidates(2 * points, places.position.dtype)
+    held, most = LANES * int(first.max()), CLUSTER * (points + LANES)
+    if held + most > entry.size:
+        likely = int(1.1 * held * cluster.size / max(begin, 1)) if 8 * begin > cluster.size else 0
+        size = max(likely, 2 * held) + most
+        larger = allocate((size,), np.int32, "a list of neighbours")
+        larger[:held] = entry[:held]
+        entry = larger
+    return (*one[:-3], places, first, entry)

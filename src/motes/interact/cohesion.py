@@ -40,8 +40,8 @@ class Cohesion:
     def near(p, a, b, r):
         v = sqrt(a.vx * a.vx + a.vy * a.vy + a.vz * a.vz)
         ahead = -(a.vx * r.x + a.vy * r.y + a.vz * r.z)
-        seen = 1.0 if ahead >= p.edge * v * r.length else 0.0
-        w = seen * (1.0 - r.length * p.per_radius)
+        seen = ahead >= p.edge * v * r.length
+        w = 1.0 - r.length * p.per_radius if seen else 0.0
         return w * r.x, w * r.y, w * r.z, w
 
     @kernel

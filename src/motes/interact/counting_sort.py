@@ -14,7 +14,7 @@ DIGIT = 11
 """Most bits that one pass sorts by: its counters fit the first cache."""
 
 _BLOCKS = 16
-_SMALLEST = 1 << 14
+_SMALLEST = 1 << 15
 
 
 @jit

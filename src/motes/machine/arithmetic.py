@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from motes.machine.block import Writer, common_type, literal
-from motes.machine.kinds import BOOL, DOUBLE, INT, UINT, Number, Unsupported, arithmetic
+from motes.machine.block import Writer, common_type, literal, zero
+from motes.machine.kinds import (
+    BOOL,
+    DOUBLE,
+    INT,
+    UINT,
+    Number,
+    Unsupported,
+    arithmetic,
+    widened,
+)
 from motes.machine.values import Group, Scalar, Value, of_registers, register_types, registers
 
 FOLDED: dict[str, Callable[[Any, Any], Any]] = {
@@ -36,7 +45,7 @@ class Arithmetic(Writer):
                 if other.type.kind == "f":
                     return other.type
                 if other.type.kind == "u" and bare.type == INT and bare.literal >= 0:
-                    return UINT
+                    return UINT.over(other.type.lanes)
         return arithmetic(a.type, b.type)
 
     def binary(self, name: str, a: Value, b: Value) -> Value:
@@ -51,7 +60,8 @@ class Arithmetic(Writer):
             return self.power(a, b)
         if name in BITS:
             both = a.type.kind == b.type.kind == "b"
-            kind = BOOL if both else self.together(a, b)
+            lanes = max(a.type.lanes, b.type.lanes)
+            kind = BOOL.over(lanes) if both else self.together(a, b)
             if not kind.whole:
                 raise Unsupported("operators of bits work on integers only")
             return self._plain(BITS[name], kind, a, b)
@@ -61,13 +71,15 @@ class Arithmetic(Writer):
             return self._plain(step, kind, a, b)
         kind = self.together(a, b)
         if name == "Div" and kind.whole:
-            kind = DOUBLE
+            kind = DOUBLE.over(kind.lanes)
         if kind.kind == "f":
             if name in REAL:
                 return self._plain(f"{REAL[name]} {self.flags}".strip(), kind, a, b)
             return self._floored_real(name, self.cast(a, kind), self.cast(b, kind))
         if name in WHOLE:
             return self._plain(WHOLE[name], kind, a, b)
+        if kind.lanes > 1:
+            raise Unsupported("integers are not divided lane by lane")
         return self._floored(name, self.cast(a, kind), self.cast(b, kind))
 
     def _plain(self, step: str, kind: Number, a: Scalar, b: Scalar) -> Scalar:
@@ -138,12 +150,16 @@ class Arithmetic(Writer):
         return Scalar(kind, self.do(f"fsub {kind.llvm} {a.text}, {product}"))
 
     def power(self, a: Scalar, b: Scalar) -> Value:
-        """A power: products for small whole exponents."""
-        if b.literal is None or b.literal != int(b.literal) or abs(b.literal) > PRODUCTS:
-            raise Unsupported("a power needs a whole exponent; write pow of motes.kernel")
-        kind = a.type if a.type.kind == "f" else INT
-        result: Value | None = None
+        """A power: products and a root for small exponents that are multiples of a half."""
+        if b.literal is None or 2 * b.literal % 1 or abs(b.literal) > PRODUCTS:
+            if a.type.whole and b.type.whole:
+                raise Unsupported("a power of integers needs a small exponent that is known")
+            return self.formula("pow", [a, b])
+        kind = a.type if a.type.kind == "f" else DOUBLE if b.literal % 1 else INT
         square: Value = self.cast(a, kind)
+        result: Value | None = None
+        if b.literal % 1:
+            result = self.intrinsic("sqrt", self.cast(a, kind))
         rest = abs(int(b.literal))
         while rest:
             if rest & 1:
@@ -159,6 +175,7 @@ class Arithmetic(Writer):
         kind = values[0].type
         arguments = ", ".join(f"{kind.llvm} {v.text}" for v in values)
         suffix = f"f{kind.bits}" if kind.kind == "f" else f"i{kind.bits}"
+        suffix = suffix if kind.lanes == 1 else f"v{kind.lanes}{suffix}"
         function = f"@llvm.{name}.{suffix}"
         extra = ", i1 false" if name == "abs" else ""
         self.declare(
@@ -172,6 +189,10 @@ class Arithmetic(Writer):
         """Declare a function outside of the module."""
         raise NotImplementedError
 
+    def formula(self, name: str, arguments: Sequence[Value]) -> Value:
+        """An elementary function, by the project's own formula for the arguments' precision."""
+        raise NotImplementedError
+
     def negative(self, value: Scalar) -> Scalar:
         """-value."""
         if value.literal is not None:
@@ -181,7 +202,8 @@ class Arithmetic(Writer):
             text = f"fneg {self.flags}{value.type.llvm} {value.text}"
             return Scalar(value.type, self.do(text))
         kind = arithmetic(value.type, value.type)
-        return Scalar(kind, self.do(f"sub {kind.llvm} 0, {self.cast(value, kind).text}"))
+        text = f"sub {kind.llvm} {zero(kind.llvm)}, {self.cast(value, kind).text}"
+        return Scalar(kind, self.do(text))
 
     def compare(self, name: str, a: Scalar, b: Scalar) -> Scalar:
         """A comparison, by its name in Python's syntax tree; false with NaN, except !=."""
@@ -191,12 +213,15 @@ class Arithmetic(Writer):
                 "Eq": operator.eq, "NotEq": operator.ne,
             }[name](a.literal, b.literal)  # fmt: skip
             return literal(known, BOOL)
-        test = ORDER[name]
+        test, lanes = ORDER[name], max(a.type.lanes, b.type.lanes)
         if not (a.type.whole and b.type.whole):
             kind = self.together(a, b)
             left, right = self.cast(a, kind).text, self.cast(b, kind).text
             ordered = "u" if name == "NotEq" else "o"
-            return Scalar(BOOL, self.do(f"fcmp {ordered}{test} {kind.llvm} {left}, {right}"))
+            text = f"fcmp {ordered}{test} {kind.llvm} {left}, {right}"
+            return Scalar(BOOL.over(lanes), self.do(text))
+        if lanes > 1:
+            return self._compared_lanes(name, a, b)
         signs = {v.type.kind for v in (a, b) if v.literal is None or v.literal < 0}
         bits, wide = 64, max(a.type.bits, b.type.bits)
         if a.type == b.type:
@@ -206,6 +231,15 @@ class Arithmetic(Writer):
         left, right = (self._widened(v, bits) for v in (a, b))
         sign = "" if name in ("Eq", "NotEq") else "s" if "i" in signs else "u"
         return Scalar(BOOL, self.do(f"icmp {sign}{test} i{bits} {left}, {right}"))
+
+    def _compared_lanes(self, name: str, a: Scalar, b: Scalar) -> Scalar:
+        """A comparison of integers lane by lane, in the type that they have, or are added in."""
+        alike = a.type.over(1) == b.type.over(1)
+        kind = a.type.over(max(a.type.lanes, b.type.lanes)) if alike else self.together(a, b)
+        left, right = self.cast(a, kind).text, self.cast(b, kind).text
+        sign = "" if name in ("Eq", "NotEq") else "s" if kind.kind == "i" else "u"
+        text = f"icmp {sign}{ORDER[name]} {kind.llvm} {left}, {right}"
+        return Scalar(BOOL.over(kind.lanes), self.do(text))
 
     def _widened(self, value: Scalar, bits: int) -> str:
         if value.literal is not None:
@@ -220,10 +254,14 @@ class Arithmetic(Writer):
         kind = common_type([yes, no])
         if kind is None:
             return None
+        if (lanes := condition.type.lanes) > 1:
+            kind = widened(kind, lanes)
         a, b = self.converted(yes, kind), self.converted(no, kind)
         pairs = zip(registers(a), registers(b), register_types(kind), strict=True)
         picked = [
-            x if x == y else self.do(f"select i1 {condition.text}, {t} {x}, {t} {y}")
+            x
+            if x == y
+            else self.do(f"select {condition.type.llvm} {condition.text}, {t} {x}, {t} {y}")
             for x, y, t in pairs
         ]
         return of_registers(kind, picked)

@@ -86,8 +86,11 @@ class Writer:
     def cast(self, value: Scalar, to: Number) -> Scalar:
         """A number as another type."""
         given = value.type
+        to = to.over(max(to.lanes, given.lanes))
         if value.literal is not None:
             return literal(value.literal, to)
+        if to.lanes > given.lanes:
+            return self.spread(self.cast(value, to.over(1)), to.lanes)
         if given == to:
             return Scalar(to, value.text)
         if to.kind == "b":
@@ -104,6 +107,14 @@ class Writer:
             step = "fpext" if to.bits > given.bits else "fptrunc"
         return Scalar(to, self.do(f"{step} {given.llvm} {value.text} to {to.llvm}"))
 
+    def spread(self, value: Scalar, lanes: int) -> Scalar:
+        """The same number in every lane."""
+        one, many = value.type, value.type.over(lanes)
+        first = self.do(f"insertelement {many.llvm} poison, {one.llvm} {value.text}, i64 0")
+        order = f"<{lanes} x i32> zeroinitializer"
+        text = f"shufflevector {many.llvm} {first}, {many.llvm} poison, {order}"
+        return Scalar(many, self.do(text))
+
     def truth(self, value: Value) -> Scalar:
         """Whether a number is not 0."""
         if not isinstance(value, Scalar):
@@ -112,8 +123,9 @@ class Writer:
             return value
         if value.literal is not None:
             return literal(bool(value.literal), BOOL)
-        test, zero = ("fcmp une", "0.0") if value.type.kind == "f" else ("icmp ne", "0")
-        return Scalar(BOOL, self.do(f"{test} {value.type.llvm} {value.text}, {zero}"))
+        test, kind = "fcmp une" if value.type.kind == "f" else "icmp ne", value.type
+        text = f"{test} {kind.llvm} {value.text}, {zero(kind.llvm)}"
+        return Scalar(BOOL.over(kind.lanes), self.do(text))
 
     def converted(self, value: Value, to: Type) -> Value:
         """A value as another type that it may be joined into."""
@@ -234,11 +246,17 @@ def common_type(values: list[Value]) -> Type | None:
 
 def zero(llvm: str) -> str:
     """Zero of one of LLVM's types."""
+    if llvm.startswith("<"):
+        return "zeroinitializer"
     return {"ptr": "null", "float": "0.0", "double": "0.0", "i1": "false"}.get(llvm, "0")
 
 
 def literal(value: Any, kind: Number, bare: bool = False) -> Scalar:
     """A number that is known while compiling, as a type."""
+    if kind.lanes > 1:
+        one = literal(value, kind.over(1), bare)
+        each = ", ".join([f"{one.type.llvm} {one.text}"] * kind.lanes)
+        return Scalar(kind, f"<{each}>", one.literal, bare)
     if kind.kind == "b":
         return Scalar(kind, "true" if value else "false", bool(value), bare)
     if kind.whole:

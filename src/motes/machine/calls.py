@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import types
 from collections.abc import Callable, Sequence
@@ -14,33 +15,22 @@ from motes.machine.kinds import (
     BOOL,
     DOUBLE,
     INT,
+    INT32,
     NUMBERS,
+    UINT,
     Array,
     Number,
     Unsupported,
     of_dtype,
 )
+from motes.machine.lanes import bits, lowest, put, settled, take
 from motes.machine.memory import Memory
+from motes.machine.shuffles import SEEKING_NEEDS, near_slots, seeking, taken_apart, taking
 from motes.machine.values import Group, Known, Scalar, Value, View, type_of
 
 ROOM = 1 << 14
 """Elements of an array that is kept on the stack; larger ones, or of a size that is not known while
 compiling, come from the heap."""
-
-
-def constant(thing: Any) -> Value:
-    """The value of a Python object that a function finds in its module or closure."""
-    if isinstance(thing, bool | np.bool_):
-        return literal(bool(thing), BOOL)
-    if isinstance(thing, np.generic):
-        return literal(thing.item(), of_dtype(thing.dtype))
-    if isinstance(thing, int):
-        return literal(thing, INT, bare=True)
-    if isinstance(thing, float):
-        return literal(thing, DOUBLE, bare=True)
-    if isinstance(thing, tuple):
-        return Group(tuple(constant(t) for t in thing), tuple(getattr(thing, "_fields", ())))
-    return Known(thing)
 
 
 def plain_function(thing: Any) -> types.FunctionType | None:
@@ -51,6 +41,38 @@ def plain_function(thing: Any) -> types.FunctionType | None:
 
 class Calls(Memory):
     """Calls by what is called."""
+
+    def constant(self, thing: Any) -> Value:
+        """The value of a Python object that a function finds in its module or closure."""
+        if isinstance(thing, bool | np.bool_):
+            return literal(bool(thing), BOOL)
+        if isinstance(thing, np.generic):
+            return literal(thing.item(), of_dtype(thing.dtype))
+        if isinstance(thing, int):
+            return literal(thing, INT, bare=True)
+        if isinstance(thing, float):
+            return literal(thing, DOUBLE, bare=True)
+        if isinstance(thing, tuple):
+            items = tuple(self.constant(t) for t in thing)
+            return Group(items, tuple(getattr(thing, "_fields", ())))
+        if isinstance(thing, np.ndarray):
+            return self._table(thing)
+        return Known(thing)
+
+    def _table(self, array: np.ndarray[Any, Any]) -> Value:
+        """An array as it is while compiling, part of the machine code; it is only read."""
+        item = of_dtype(array.dtype)
+        if array.size > ROOM:
+            raise Unsupported(f"an array of more than {ROOM} numbers; pass it as an argument")
+        whole = item.kind == "b"
+        numbers = [str(int(x)) if whole else literal(x, item).text for x in array.ravel().tolist()]
+        content = ", ".join(f"{item.stored} {number}" for number in numbers)
+        kind = f"[{array.size} x {item.stored}]"
+        name = f"@table_{hashlib.sha256(f'{kind}{content}'.encode()).hexdigest()[:24]}"
+        filled = f"[{content}]" if array.size else "zeroinitializer"
+        self.declare(f"{name} = internal global {kind} {filled}, align 64")
+        extents = tuple(map(str, array.shape))
+        return View(Array(item, array.ndim, True), name, extents)
 
     def call(self, thing: Any, arguments: Sequence[Value]) -> Value:
         """The value of a call of something known."""
@@ -66,8 +88,8 @@ class Calls(Memory):
             if len(arguments) != len(thing._fields):
                 raise Unsupported(f"{thing.__name__} takes {len(thing._fields)} values")
             return Group(tuple(arguments), thing._fields)
-        if isinstance(thing, np.ufunc) and thing in FORMULAS:
-            return self._formula(FORMULAS[thing], arguments)
+        if isinstance(thing, np.ufunc | types.BuiltinFunctionType) and thing in FORMULAS:
+            return self.formula(FORMULAS[thing], arguments)
         function = plain_function(thing)
         if function is None:
             raise Unsupported(f"{getattr(thing, '__name__', thing)!r} cannot be called in a kernel")
@@ -79,7 +101,7 @@ class Calls(Memory):
         """The value of a call of another kernel."""
         raise NotImplementedError
 
-    def _formula(self, name: str, arguments: Sequence[Value]) -> Value:
+    def formula(self, name: str, arguments: Sequence[Value]) -> Value:
         """An elementary function, by the project's own formula for the arguments' precision."""
         from motes.kernel import ELEMENTARY
 
@@ -159,7 +181,7 @@ class Calls(Memory):
         """numpy.isnan."""
         number = self._real(value)
         test = f"fcmp uno {number.type.llvm} {number.text}, {number.text}"
-        return Scalar(BOOL, self.do(test))
+        return Scalar(BOOL.over(number.type.lanes), self.do(test))
 
     def length(self, value: Value) -> Value:
         """len."""
@@ -178,11 +200,27 @@ class Calls(Memory):
 
     def bits_as(self, value: Scalar, kind: Number) -> Scalar:
         """`value.view(type)`: the same bits as another type."""
+        kind = kind.over(value.type.lanes)
         if value.type.bits != kind.bits:
             raise Unsupported(f"{value.type} and {kind} differ in size")
         if value.type.llvm == kind.llvm:
             return Scalar(kind, value.text)
         return Scalar(kind, self.do(f"bitcast {value.type.llvm} {value.text} to {kind.llvm}"))
+
+    def bits(self, condition: Value) -> Value:
+        """`lanes.bits`."""
+        truth = self.truth(condition)
+        lanes = truth.type.lanes
+        whole = truth.text
+        if lanes > 1:
+            whole = self.do(f"bitcast {truth.type.llvm} {truth.text} to i{lanes}")
+        return Scalar(UINT, self.do(f"zext i{lanes} {whole} to i64"))
+
+    def lowest(self, number: Value) -> Value:
+        """`lanes.lowest`."""
+        self.declare("declare i64 @llvm.cttz.i64(i64, i1)")
+        whole = self.cast(self._number(number), UINT).text
+        return Scalar(UINT, self.do(f"call i64 @llvm.cttz.i64(i64 {whole}, i1 true)"))
 
     def empty(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
         """numpy.empty: room that the call has for itself; its numbers are not set."""
@@ -199,6 +237,27 @@ class Calls(Memory):
             bytes = self.do(f"mul nsw i64 {bytes}, {text}")
         return View(packed, self.heap(bytes), texts)
 
+    def reshaped(self, array: View, extents: Sequence[Value]) -> View:
+        """`array.reshape`, `array.ravel()` of a packed array: the same numbers in another shape."""
+        if not array.type.packed:
+            raise Unsupported("only an array whose numbers follow each other can be reshaped")
+        if len(extents) == 1 and isinstance(extents[0], Group):
+            extents = extents[0].items
+        sizes = [self.cast(self._number(e), INT) for e in extents]
+        texts = [size.text for size in sizes]
+        for place, size in enumerate(sizes):
+            if size.literal == -1:
+                others = self.product([*texts[:place], *texts[place + 1 :]])
+                texts[place] = self.do(f"sdiv i64 {self.product(array.shape)}, {others}")
+        return View(Array(array.type.item, len(texts), True), array.address, tuple(texts))
+
+    def product(self, extents: Sequence[str]) -> str:
+        """Of integers in registers."""
+        result = "1"
+        for place, extent in enumerate(extents):
+            result = self.do(f"mul nsw i64 {result}, {extent}") if place else extent
+        return result
+
     def zeros(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
         """numpy.zeros."""
         array = self.empty(shape, kind)
@@ -209,6 +268,48 @@ class Calls(Memory):
     def heap(self, bytes: str) -> str:
         """Address of memory that is given back when the function returns."""
         raise NotImplementedError
+
+    def written(self, name: str, text: str) -> None:
+        """See to it that the module holds a function whose text is known."""
+        raise NotImplementedError
+
+    def taken_apart(self, records: Value, slots: Value, *columns: Value) -> Value:
+        """`lanes.taken_apart`."""
+        views = self._packed(records, slots, *columns)
+        item = views[0].type.item
+        if views[0].type.axes != 2 or item.kind != "f" or views[1].type.item.bits != 32:
+            raise Unsupported("records of real numbers are taken apart, by numbers of 32 bits")
+        name = f"taken_apart.{item.llvm}"
+        self.written(name, taking(item.llvm))
+        x, y, z = (f"ptr {view.address}" for view in views[2:])
+        given = f"ptr {views[0].address}, ptr {views[1].address}, i64 {views[1].shape[0]}"
+        self.line(f"call void @{name}({given}, {x}, {y}, {z})")
+        return Known(None)
+
+    def near_slots(self, *given: Value) -> Value:
+        """`lanes.near_slots`."""
+        from motes.machine.target import moves_lanes
+
+        if not moves_lanes():
+            return self.call_function(near_slots, near_slots, given)
+        views = self._packed(*given[5:])
+        item = views[0].type.item
+        numbers = [self.cast(self._number(value), item).text for value in given[:4]]
+        me = self.cast(self._number(given[4]), INT32).text
+        for declaration in SEEKING_NEEDS:
+            self.declare(declaration)
+        name = f"near_slots.{item.llvm}"
+        self.written(name, seeking(item.llvm))
+        passed = [f"{item.llvm} {number}" for number in numbers]
+        passed += [f"i32 {me}", *(f"ptr {view.address}" for view in views[:4])]
+        passed += [f"i64 {views[3].shape[0]}", f"ptr {views[4].address}"]
+        return Scalar(INT, self.do(f"call i64 @{name}({', '.join(passed)})"))
+
+    def _packed(self, *values: Value) -> list[View]:
+        views = [value for value in values if isinstance(value, View) and value.type.packed]
+        if len(views) != len(values):
+            raise Unsupported("only packed arrays are taken here")
+        return views
 
 
 def _thing(value: Value) -> Any:
@@ -248,12 +349,21 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     np.round: _intrinsic("roundeven"),
     np.rint: _intrinsic("roundeven"),
     enumerate: Calls.numbered,
+    take: Calls.take,
+    put: Calls.put,
+    bits: Calls.bits,
+    lowest: Calls.lowest,
+    settled: _intrinsic("arithmetic.fence"),
     math.fabs: _intrinsic("fabs"),
+    taken_apart: Calls.taken_apart,
+    near_slots: Calls.near_slots,
 }
 """Handlers by the function itself."""
 
 FORMULAS = {
     np.exp: "exp", np.log: "log", np.sin: "sin", np.cos: "cos", np.tanh: "tanh",
     np.arctan2: "atan2", np.power: "pow",
+    math.exp: "exp", math.log: "log", math.sin: "sin", math.cos: "cos", math.tanh: "tanh",
+    math.atan2: "atan2", math.pow: "pow",
 }  # fmt: skip
-"""NumPy's functions that the project has formulas for."""
+"""NumPy's and Python's functions that the project has formulas for."""

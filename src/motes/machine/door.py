@@ -26,6 +26,10 @@ _PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_char_p, ctypes.c_void_p)
 """Calls through it release the interpreter's lock."""
 
 
+_EACH = ctypes.CFUNCTYPE(
+    None, ctypes.c_char_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64
+)
+
 PLAIN = frozenset({int, float, *(np.dtype(letter).type for letter in "bBhHiIlLqQfd")})
 """Types of arguments that go to machine code as the numbers that they are."""
 
@@ -126,8 +130,9 @@ def _taker(kind: Type) -> Callable[[list[Any]], Any]:
 class Door:
     """Machine code for one list of argument types."""
 
-    def __init__(self, address: int, kinds: Sequence[Type], result: Type) -> None:
-        self._function = _PROTOTYPE(address)
+    def __init__(self, addresses: tuple[int, int], kinds: Sequence[Type], result: Type) -> None:
+        self._function = _PROTOTYPE(addresses[0])
+        self._each = _EACH(addresses[1]) if addresses[1] else None
         self._letters = "".join(map(letters, kinds))
         self._pack = struct.Struct("=" + self._letters).pack
         self._result = result
@@ -155,3 +160,19 @@ class Door:
         packed = struct.pack("=" + self._letters[:count], *numbers)
         pack = struct.Struct("=" + self._letters[count:]).pack
         return lambda *rest: function(packed + pack(*rest), None)
+
+    def each(
+        self, head: Sequence[Any], tails: Sequence[Sequence[Any]]
+    ) -> Callable[[Any, int], None] | None:
+        """Calls with the same first numbers and different last ones, as one function of a counter
+        (the address of one integer) and how many calls at most; None where calls give results.
+
+        Threads that run it together share the calls out.
+        """
+        if self._each is None:
+            return None
+        first = struct.pack("=" + self._letters[: len(head)], *head)
+        pack = struct.Struct("=" + self._letters[len(head) :]).pack
+        packs = [first + pack(*tail) for tail in tails]
+        run, whole, count, stride = self._each, b"".join(packs), len(packs), len(packs[0])
+        return lambda counter, most: run(whole, stride, counter, count, most)

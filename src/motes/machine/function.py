@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from motes.machine.block import Edge, Names, common_type
-from motes.machine.calls import constant
-from motes.machine.kinds import Number, Type, Unsupported
+from motes.machine.kinds import Array, Number, Tuple, Type, Unsupported
 from motes.machine.loops import Loops
 from motes.machine.source import Source
 from motes.machine.statements import Loop
@@ -44,6 +43,7 @@ class Function(Loops):
         self._returns: list[Edge] = []
         self._loops: list[Loop] = []
         self._heap: list[str] = []
+        self._rooms: list[tuple[str, Number, int]] = []
         self.names: Names = {}
         self.heads: list[str] = []
         if len(arguments) != len(self.source.parameters):
@@ -56,6 +56,8 @@ class Function(Loops):
             self.heads += [f"{t} {r}" for t, r in passed]
             self.names[name] = of_registers(kind, [r for _, r in passed])
         self.result: Type = self._write()
+        if self._heap and _has_array(self.result):
+            raise Unsupported("a function returns an array whose size is not known")
 
     def _write(self) -> Type:
         self.statements(self.source.body)
@@ -86,12 +88,23 @@ class Function(Loops):
             self.line("ret void")
         return kind
 
+    @property
+    def lent(self) -> tuple[tuple[Number, int], ...]:
+        """Room that the caller lends, because an array that is returned may lie in it."""
+        lends = _has_array(self.result)
+        return tuple((kind, count) for _, kind, count in self._rooms) if lends else ()
+
     def text(self, name: str, attributes: str) -> str:
         """The function's definition."""
-        first = self.blocks[0]
-        lines = [f"define internal {returned(self.result)} @{name}({', '.join(self.heads)})"
+        first, heads, rooms = self.blocks[0], list(self.heads), []
+        for register, kind, count in self._rooms:
+            if self.lent:
+                heads.append(f"ptr {register}")
+            else:
+                rooms.append(f"{register} = alloca [{count} x {kind.stored}], align 32")
+        lines = [f"define internal {returned(self.result)} @{name}({', '.join(heads)})"
                  f" {attributes} {{"]  # fmt: skip
-        lines += ["head:", *self.head.lines, f"br label %{first.label}"]
+        lines += ["head:", *rooms, *self.head.lines, f"br label %{first.label}"]
         for block in self.blocks:
             if block.lines:
                 lines += [f"{block.label}:", *block.lines]
@@ -101,9 +114,19 @@ class Function(Loops):
         """Declare a function outside of the module."""
         self.module.declarations.add(text)
 
+    def written(self, name: str, text: str) -> None:
+        """See to it that the module holds a function whose text is known."""
+        self.module.known.setdefault(name, text)
+
     def kind_of_memory(self, item: Number) -> str:
         """The mark of an array's type."""
         return self.module.kind_of_memory(item)
+
+    def room(self, kind: Number, count: int) -> str:
+        """Room on the stack, or lent by the caller where the function returns an array."""
+        register = self.register()
+        self._rooms.append((register, kind, count))
+        return register
 
     def heap(self, bytes: str) -> str:
         """Memory that is given back at the end."""
@@ -124,14 +147,17 @@ class Function(Loops):
         defaults = function.__defaults__ or ()
         missing = len(Source.of(function).parameters) - len(arguments)
         if 0 < missing <= len(defaults):
-            arguments = [*arguments, *(constant(d) for d in defaults[-missing:])]
+            arguments = [*arguments, *(self.constant(d) for d in defaults[-missing:])]
         kinds = tuple(type_of(a) for a in arguments)
-        name, result = self.module.function(thing, function, kinds, self.flags)
+        name, result, lent = self.module.function(thing, function, kinds, self.flags)
+        if lent and self._loops:
+            raise Unsupported("a function that returns an array of its own, called inside a loop")
         passed = [
             f"{t} {r}"
             for a, kind in zip(arguments, kinds, strict=True)
             for t, r in zip(register_types(kind), registers(a), strict=True)
         ]
+        passed += [f"ptr {self.room(kind, count)}" for kind, count in lent]
         call = f"call {returned(result)} @{name}({', '.join(passed)})"
         kinds_out = register_types(result)
         if not kinds_out:
@@ -143,6 +169,12 @@ class Function(Loops):
         struct = f"{{ {', '.join(kinds_out)} }}"
         parts = [self.do(f"extractvalue {struct} {whole}, {k}") for k in range(len(kinds_out))]
         return of_registers(result, parts)
+
+
+def _has_array(kind: Type) -> bool:
+    return isinstance(kind, Array) or (
+        isinstance(kind, Tuple) and any(_has_array(item) for item in kind.items)
+    )
 
 
 def returned(kind: Type) -> str:

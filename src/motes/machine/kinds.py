@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,13 +30,20 @@ class Number:
     kind: str
     """As in NumPy: "b" for truth values, "i" and "u" for integers, "f" for real numbers."""
     bits: int
+    lanes: int = 1
+    """How many of them an operation works on at once; arrays hold single ones."""
 
     @property
     def llvm(self) -> str:
         """LLVM's type of a value in a register."""
+        name = f"i{self.bits}"
         if self.kind == "f":
-            return "float" if self.bits == 32 else "double"
-        return f"i{self.bits}"
+            name = "float" if self.bits == 32 else "double"
+        return name if self.lanes == 1 else f"<{self.lanes} x {name}>"
+
+    def over(self, lanes: int) -> Number:
+        """The same type over a number of lanes."""
+        return self if lanes == self.lanes else replace(self, lanes=lanes)
 
     @property
     def stored(self) -> str:
@@ -54,7 +61,7 @@ class Number:
         return self.kind != "f"
 
     def __str__(self) -> str:
-        return self.name
+        return self.name if self.lanes == 1 else f"{self.lanes} lanes of {self.name}"
 
 
 @dataclass(frozen=True)
@@ -113,6 +120,8 @@ def of_dtype(dtype: np.dtype[np.generic]) -> Number:
 
 def arithmetic(a: Number, b: Number) -> Number:
     """The type in which two numbers are added: at least 64 bits for integers."""
+    if (lanes := max(a.lanes, b.lanes)) > 1:
+        return arithmetic(a.over(1), b.over(1)).over(lanes)
     if a.whole and b.whole:
         return UINT if a.kind == b.kind == "u" else INT
     if a.whole or b.whole:
@@ -126,6 +135,8 @@ def joined(a: Type, b: Type) -> Type:
     if a == b:
         return a
     if isinstance(a, Number) and isinstance(b, Number):
+        if (lanes := max(a.lanes, b.lanes)) > 1:
+            return widened(joined(a.over(1), b.over(1)), lanes)
         if a.kind == b.kind:
             return a if a.bits >= b.bits else b
         return arithmetic(a, b)
@@ -135,3 +146,12 @@ def joined(a: Type, b: Type) -> Type:
     if isinstance(a, Array) and isinstance(b, Array) and (a.item, a.axes) == (b.item, b.axes):
         return Array(a.item, a.axes, False)
     raise Unsupported(f"a name is {a} on one way through the code and {b} on another")
+
+
+def widened(kind: Type, lanes: int) -> Type:
+    """A type whose numbers are all over a number of lanes."""
+    if isinstance(kind, Number):
+        return kind.over(lanes)
+    if isinstance(kind, Tuple):
+        return Tuple(tuple(widened(item, lanes) for item in kind.items), kind.names)
+    raise Unsupported(f"{kind} cannot differ from lane to lane")

@@ -184,6 +184,8 @@ class Loops(Statements):
         loop = Loop()
         self._loops.append(loop)
         condition = goes_on()
+        if condition.type.lanes > 1:
+            raise Unsupported("a loop ends for all lanes at once")
         names = self.names
         exits: list[Edge] = []
         if condition.literal is None:

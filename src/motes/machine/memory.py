@@ -57,12 +57,37 @@ class Memory(Arithmetic):
         """Write an element."""
         if len(places) != array.type.axes or not isinstance(value, Scalar):
             raise Unsupported("only numbers can be written into elements of arrays")
+        if array.address.startswith("@"):
+            raise Unsupported("an array of the module is only read")
         item = array.type.item
-        text = self.cast(value, item).text
+        number = self.cast(value, item)
+        if number.type.lanes > 1:
+            raise Unsupported("lanes are written by put")
+        text = number.text
         if item.kind == "b":
             text = self.do(f"zext i1 {text} to i8")
         address = self.element(array, places)
         self.line(f"store {item.stored} {text}, ptr {address}{self.kind_of_memory(item)}")
+
+    def take(self, array: View, place: Scalar, lanes: Scalar) -> Scalar:
+        """Elements of an array, from a place on, one for each lane."""
+        one, address = array.type.item, self._start(array, place)
+        kind = one.over(int(lanes.literal))
+        text = f"load {kind.llvm}, ptr {address}, align {one.bytes}{self.kind_of_memory(one)}"
+        return Scalar(kind, self.do(text))
+
+    def put(self, array: View, place: Scalar, value: Scalar) -> Value:
+        """Write lanes to the elements of an array, from a place on."""
+        one, address = array.type.item, self._start(array, place)
+        number = self.cast(value, one)
+        text = f"{number.type.llvm} {number.text}, ptr {address}, align {one.bytes}"
+        self.line(f"store {text}{self.kind_of_memory(one)}")
+        return Known(None)
+
+    def _start(self, array: View, place: Scalar) -> str:
+        if not array.type.packed or array.type.axes != 1 or array.type.item.kind == "b":
+            raise Unsupported("lanes are taken from packed numbers along one axis")
+        return self.element(array, [place])
 
     def kind_of_memory(self, item: Number) -> str:
         """A mark that tells LLVM that arrays of different types do not overlap."""
@@ -153,6 +178,4 @@ class Memory(Arithmetic):
 
     def room(self, kind: Number, count: int) -> str:
         """Address of room for numbers on the stack."""
-        register = self.register()
-        self.head.lines.append(f"{register} = alloca [{count} x {kind.stored}], align 32")
-        return register
+        raise NotImplementedError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from motes.machine.block import Writer
 from motes.machine.calls import plain_function
@@ -15,6 +15,10 @@ from motes.machine.values import Scalar, register_types
 ENTRY = "motes_entry"
 """Name of the function that Python calls: it reads arguments of 8 bytes each from memory."""
 
+EACH = "motes_each"
+"""Name of the function that runs the first for many packs of arguments, whose number threads take
+from a common counter."""
+
 PLAIN = "nounwind mustprogress"
 
 _WORD = 8
@@ -23,23 +27,34 @@ FIELDS = {"data": _HEAD, "shape": _HEAD + 2 * _WORD, "strides": _HEAD + 3 * _WOR
 """Where NumPy's arrays (PyArrayObject_fields in its C interface) keep what a kernel needs."""
 
 
+class Made(NamedTuple):
+    """A function of a module."""
+
+    name: str
+    result: Type
+    lent: tuple[tuple[Number, int], ...]
+    """Room that its caller lends."""
+
+
 class Module:
     """Functions by what they are, with the types of their arguments."""
 
     def __init__(self) -> None:
         self.declarations: set[str] = set()
-        self._functions: dict[Any, tuple[str, Type] | None] = {}
+        self.known: dict[str, str] = {}
+        """Functions whose text does not follow from Python's, by name."""
+        self._functions: dict[Any, Made | None] = {}
         self._texts: list[str] = []
         self._memory: dict[Number, int] = {}
 
     def function(
         self, thing: Any, function: types.FunctionType, kinds: Sequence[Type], flags: Any
-    ) -> tuple[str, Type]:
-        """Name and type of the result of a function for arguments of given types.
+    ) -> Made:
+        """A function for arguments of given types: its name, its result, the room that it takes.
 
         `thing` is what is called: a kernel has flags of its own, a plain function those given.
         """
-        flags = getattr(thing, "flags", flags if isinstance(flags, frozenset) else None)
+        flags = getattr(thing, "flags", flags)
         flags = frozenset(flags.split()) if isinstance(flags, str) else flags
         key = (function, flags, tuple(kinds))
         if key in self._functions:
@@ -48,12 +63,12 @@ class Module:
                 raise Unsupported(f"{function.__name__} calls itself")
             return known
         self._functions[key] = None
-        writer = Function(self, function, kinds, flags)
         name = f"{function.__name__}.{len(self._functions)}"
+        writer = Function(self, function, kinds, flags)
         inline = "alwaysinline" if getattr(thing, "inline", True) else "noinline"
         self._texts.append(writer.text(name, f"{inline} {PLAIN}"))
-        self._functions[key] = name, writer.result
-        return name, writer.result
+        self._functions[key] = made = Made(name, writer.result, writer.lent)
+        return made
 
     def kind_of_memory(self, item: Number) -> str:
         """The mark of loads and stores of a type of number."""
@@ -67,7 +82,8 @@ class Module:
             first = 2 * number + 1
             tables.append(f'!{first} = !{{!"{item.name}", !0, i64 0}}')
             tables.append(f"!{first + 1} = !{{!{first}, !{first}, i64 0}}")
-        parts = [*sorted(self.declarations), *self._texts, door(name, result, kinds), *tables]
+        written = [*self.known.values(), *self._texts]
+        parts = [*sorted(self.declarations), *written, door(name, result, kinds), *tables]
         return "\n".join(parts)
 
 
@@ -129,8 +145,26 @@ def door(name: str, result: Type, kinds: Sequence[Type]) -> str:
         at = writer.do(f"getelementptr inbounds i64, ptr %to, i64 {k}")
         writer.line(f"store {number.type.llvm} {number.text}, ptr {at}")
     body = "\n".join(writer.blocks[0].lines)
-    return (
+    entry = (
         f"define void @{ENTRY}(ptr noalias %from, ptr noalias %to) {PLAIN} {{\n{body}\nret void\n}}"
+    )
+    return entry if out else f"{entry}\n{each()}"
+
+
+def each() -> str:
+    """The door's loop: packs of `stride` bytes until `most` are done or all `count` are taken."""
+    return (
+        f"define void @{EACH}(ptr %from, i64 %stride, ptr %next, i64 %count, i64 %most) "
+        f"nounwind {{\nhead:\n  br label %top\ntop:\n"
+        "  %done = phi i64 [ 0, %head ], [ %more, %body ]\n"
+        "  %enough = icmp sge i64 %done, %most\n"
+        "  br i1 %enough, label %end, label %take\ntake:\n"
+        "  %k = atomicrmw add ptr %next, i64 1 seq_cst\n"
+        "  %over = icmp sge i64 %k, %count\n  br i1 %over, label %end, label %body\nbody:\n"
+        "  %offset = mul i64 %k, %stride\n"
+        "  %pack = getelementptr inbounds i8, ptr %from, i64 %offset\n"
+        f"  call void @{ENTRY}(ptr %pack, ptr null)\n"
+        "  %more = add i64 %done, 1\n  br label %top\nend:\n  ret void\n}"
     )
 
 
@@ -145,5 +179,5 @@ def compiled_text(kernel: Any, kinds: Sequence[Type]) -> tuple[str, Type]:
     """LLVM's text of a kernel for argument types, and the type of its result."""
     module, function = Module(), plain_function(kernel)
     assert function is not None
-    name, result = module.function(kernel, function, kinds, frozenset())
+    name, result, _ = module.function(kernel, function, kinds, frozenset())
     return module.text(name, result, kinds), result

@@ -11,6 +11,9 @@ from motes.machine.kinds import INT, Unsupported
 from motes.machine.syntax import RETURNED, Expressions
 from motes.machine.values import Group, Known, Scalar, Value, View
 
+LEAVES = (ast.Return, ast.Break, ast.Continue)
+"""What cannot be done for some lanes only; nor can a write into an array."""
+
 
 @dataclass
 class Loop:
@@ -126,6 +129,9 @@ class Statements(Expressions):
         if condition.literal is not None:
             self.statements(node.body if condition.literal else node.orelse)
             return
+        if condition.type.lanes > 1:
+            self._both_ways(node, condition)
+            return
         yes, no = self.fork(condition.text)
         before, edges = self.names, []
         for block, body in ((yes, node.body), (no, node.orelse)):
@@ -134,3 +140,23 @@ class Statements(Expressions):
             if self.block is not None:
                 edges.append((self.block, self.names))
         self.names = self.join(edges)
+
+    def _both_ways(self, node: ast.If, condition: Scalar) -> None:
+        """Both ways of a condition that differs from lane to lane, and a choice of each name."""
+        parts = [n for part in (*node.body, *node.orelse) for n in ast.walk(part)]
+        writes = (isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store) for n in parts)
+        if any(isinstance(n, LEAVES) for n in parts) or any(writes):
+            raise Unsupported("lanes go the same way: a choice of names only")
+        before, found = self.names, []
+        for body in (node.body, node.orelse):
+            self.names = dict(before)
+            self.statements(body)
+            found.append(self.names)
+        yes, no = found
+        self.names = dict(before)
+        for name in self.source.assigned(node):
+            if name in yes and name in no:
+                picked = self.chosen(condition, yes[name], no[name])
+                if picked is None:
+                    raise Unsupported(f"{name} has two types that do not fit")
+                self.names[name] = picked

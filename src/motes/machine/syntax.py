@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from motes.machine.block import Edge, Names, literal
-from motes.machine.calls import Calls, constant
+from motes.machine.calls import Calls
 from motes.machine.kinds import BOOL, INT, Unsupported, of_dtype
 from motes.machine.source import Source
 from motes.machine.values import Group, Known, Scalar, Value, View, type_of
@@ -37,7 +37,7 @@ class Expressions(Calls):
         return found
 
     def _of_Constant(self, node: ast.Constant) -> Value:
-        return constant(node.value)
+        return self.constant(node.value)
 
     def _of_Name(self, node: ast.Name) -> Value:
         if node.id in self.names:
@@ -45,7 +45,7 @@ class Expressions(Calls):
         if node.id in self.source.local:
             raise Unsupported(f'"{node.id}" may be used before it has a value')
         if node.id in self.source.scope:
-            return constant(self.source.scope[node.id])
+            return self.constant(self.source.scope[node.id])
         if hasattr(builtins, node.id):
             return Known(getattr(builtins, node.id))
         raise Unsupported(f'name "{node.id}" is not known')
@@ -62,7 +62,7 @@ class Expressions(Calls):
         if isinstance(base, Known):
             if not hasattr(base.thing, node.attr):
                 raise Unsupported(f"{base.thing!r} has no {node.attr}")
-            return constant(getattr(base.thing, node.attr))
+            return self.constant(getattr(base.thing, node.attr))
         if isinstance(base, Group) and node.attr in base.names:
             return base.items[base.names.index(node.attr)]
         if isinstance(base, View) and node.attr in ("size", "shape", "ndim", "dtype"):
@@ -76,10 +76,7 @@ class Expressions(Calls):
             return literal(array.type.axes, INT, bare=True)
         if name == "dtype":
             return Known(np.dtype(array.type.item.name))
-        size = array.shape[0]
-        for extent in array.shape[1:]:
-            size = self.do(f"mul nsw i64 {size}, {extent}")
-        return Scalar(INT, size)
+        return Scalar(INT, self.product(array.shape))
 
     def _of_Subscript(self, node: ast.Subscript) -> Value:
         base, places = self.value(node.value), self._places(node.slice)
@@ -131,16 +128,16 @@ class Expressions(Calls):
         if isinstance(node.op, ast.Not):
             truth = self.truth(value)
             if truth.literal is not None:
-                return literal(not truth.literal, BOOL)
-            return Scalar(BOOL, self.do(f"xor i1 {truth.text}, true"))
+                return literal(not truth.literal, truth.type)
+            return self.binary("BitXor", truth, literal(True, BOOL))
         if not isinstance(value, Scalar):
             raise Unsupported("a sign belongs to a number")
         if isinstance(node.op, ast.USub):
             return self.negative(value)
         if isinstance(node.op, ast.Invert):
             kind = value.type
-            text = f"xor {kind.llvm} {value.text}, {'true' if kind.kind == 'b' else -1}"
-            return Scalar(kind, self.do(text))
+            ones = literal(True if kind.kind == "b" else -1, kind).text
+            return Scalar(kind, self.do(f"xor {kind.llvm} {value.text}, {ones}"))
         return value
 
     def _of_Compare(self, node: ast.Compare) -> Value:
@@ -154,7 +151,7 @@ class Expressions(Calls):
     def _both(self, a: Scalar, b: Scalar) -> Scalar:
         if a.literal is not None:
             return b if a.literal else a
-        return Scalar(BOOL, self.do(f"and i1 {a.text}, {b.text}"))
+        return self.truth(self.binary("BitAnd", a, b))
 
     def _compared(self, op: ast.cmpop, left: Value, right: Value) -> Scalar:
         if isinstance(op, ast.Is | ast.IsNot):
@@ -166,9 +163,9 @@ class Expressions(Calls):
             for item in right.items:
                 test = self._compared(ast.Eq(), left, item)
                 found = self.truth(self.binary("BitOr", found, test))
-            return found if isinstance(op, ast.In) else Scalar(
-                BOOL, self.do(f"xor i1 {found.text}, true")
-            )  # fmt: skip
+            if isinstance(op, ast.In):
+                return found
+            return self.truth(self.binary("BitXor", found, literal(True, BOOL)))
         if isinstance(left, Known) and isinstance(right, Known):
             return literal((left.thing == right.thing) == isinstance(op, ast.Eq), BOOL)
         if not isinstance(left, Scalar) or not isinstance(right, Scalar):
@@ -186,10 +183,9 @@ class Expressions(Calls):
                     break
                 result = self.condition(part)
                 continue
-            if self.source.cheap(part):
-                step = "or" if ends else "and"
-                other = self.condition(part)
-                result = Scalar(BOOL, self.do(f"{step} i1 {result.text}, {other.text}"))
+            if self.source.cheap(part) or result.type.lanes > 1:
+                step = "BitOr" if ends else "BitAnd"
+                result = self.truth(self.binary(step, result, self.condition(part)))
                 continue
             yes, no = self.fork(result.text)
             leave, self.block = (yes, no) if ends else (no, yes)
@@ -205,7 +201,8 @@ class Expressions(Calls):
         condition = self.condition(node.test)
         if condition.literal is not None:
             return self.value(node.body if condition.literal else node.orelse)
-        if self.source.cheap(node.body) and self.source.cheap(node.orelse):
+        cheap = self.source.cheap(node.body) and self.source.cheap(node.orelse)
+        if cheap or condition.type.lanes > 1:
             yes, no = self.value(node.body), self.value(node.orelse)
             picked = self.chosen(condition, yes, no)
             if picked is None:
@@ -225,11 +222,14 @@ class Expressions(Calls):
     def _of_Call(self, node: ast.Call) -> Value:
         if node.keywords:
             raise Unsupported("arguments without keywords")
-        if isinstance(node.func, ast.Attribute) and node.func.attr == "view":
-            base = self.value(node.func.value)
-            if isinstance(base, Scalar):
+        if isinstance(node.func, ast.Attribute):
+            base, name = self.value(node.func.value), node.func.attr
+            if isinstance(base, Scalar) and name == "view":
                 kind = self._thing(node.args[0])
                 return self.bits_as(base, of_dtype(np.dtype(kind)))
+            if isinstance(base, View) and name in ("reshape", "ravel"):
+                extents = [self.value(a) for a in node.args] or [literal(-1, INT)]
+                return self.reshaped(base, extents)
         thing = self.value(node.func)
         if not isinstance(thing, Known):
             raise Unsupported("only functions are called")

@@ -11,7 +11,7 @@ from typing import Any
 import llvmlite
 from llvmlite import binding
 
-from motes.machine.module import ENTRY
+from motes.machine.module import EACH, ENTRY
 
 LEVEL = 3
 
@@ -23,6 +23,11 @@ def processor() -> tuple[str, str, str]:
     if sys.platform == "win32":
         triple += "-elf"  # LLVM's loader knows that format best.
     return triple, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+
+
+def moves_lanes() -> bool:
+    """Whether the processor permutes a vector's eight lanes by those of another (AVX2)."""
+    return "+avx2" in processor()[2].split(",")
 
 
 def identity() -> str:
@@ -106,13 +111,13 @@ _loading = threading.Lock()
 _engines: list[Any] = []
 
 
-def loaded(code: bytes) -> int:
-    """Address of the door of a module's object code, which stays loaded."""
+def loaded(code: bytes) -> tuple[int, int]:
+    """Addresses of the doors of a module's object code, which stays loaded; 0 for a missing one."""
     _begin()
     with _loading:
         engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
         _engines.append(engine)
-        address: int = engine.get_function_address(ENTRY)
-    return address
+        one, many = (int(engine.get_function_address(name)) for name in (ENTRY, EACH))
+    return one, many

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.jit import jit
+from motes.generated import executed
+from motes.jit import bound, jit
 
 Array = NDArray[np.float64]
 Kernel = Any
@@ -25,12 +26,12 @@ class Sum(NamedTuple):
 
 
 def sums(lines: Sequence[Sum], rows: int, size: int | None) -> Kernel:
-    """combine(number, w, h): the sum of that number, in memory w of `rows` rows of `size` numbers.
+    """combine(w, number, h): the sum of that number, in memory w of `rows` rows of `size` numbers.
 
     The numbers stand in the machine code, each sum is one pass, and zeros are left out: with
     weights as arrays the same takes twice as long. Without a size it serves states of any.
     """
-    text = ["def combine(number, w, h):", f"    n = {size or f'w.size // {rows}'}"]
+    text = ["def combine(w, number, h):", f"    n = {size or f'w.size // {rows}'}"]
     for number, line in enumerate(lines):
         text += [
             f"    if number == {number}:",
@@ -69,8 +70,22 @@ def _sum(line: Sum) -> str:
 
 def _kernel(name: str, text: list[str], *, inline: bool) -> Kernel:
     names: dict[str, Any] = {"__name__": __name__, "math": math}
-    exec("\n".join(text), names)
-    return jit(names[name], inline=inline)
+    kernel = jit(executed("\n".join(text), names)[name], inline=inline)
+    return kernel if inline else _remembering(kernel)
+
+
+def _remembering(kernel: Kernel) -> Kernel:
+    """kernel(w, ...) for calls from Python, which takes w apart only where it is another one."""
+    known: list[tuple[Any, Any]] = [(None, None)]
+
+    def call(w, *rest):  # type: ignore[no-untyped-def]
+        last, run = known[0]
+        if last is not w:
+            run = bound(kernel, w)
+            known[0] = w, run
+        return run(*rest)
+
+    return call
 
 
 @jit

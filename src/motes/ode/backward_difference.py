@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from motes.ode.arithmetic import Kernel, add, copy, hermite, interpolate, norm
-from motes.ode.implicit_frame import EXACTLY, ends, frame
+from motes.ode.arithmetic import Kernel, copy, hermite, interpolate, norm
+from motes.ode.implicit_frame import ends, frame
 from motes.ode.jacobian import (
-    ATOL,
     BASE,
     ERROR,
     RESIDUAL,
-    RTOL,
     STATE,
-    VALUE,
     Newton,
 )
 from motes.ode.march import FIRST_SLOPE, Pieces, Room
@@ -33,8 +28,7 @@ def backward_difference(slope: Kernel, newton: Newton, n: int, wrap: Wrap) -> tu
     """
     slopes = 6
     shared = frame(slopes, np.ones((1, 1)), slope, newton, n, wrap)
-    spare, line, linearise, judge = shared.spare, shared.line, shared.linearise, shared.judge
-    iterations = newton.iterations
+    spare, line, linearise, settle = shared.spare, shared.line, shared.linearise, shared.settle
     before, distance, length, final = range(FIRST_SLOPE + 2, FIRST_SLOPE + 6)
 
     @wrap.part
@@ -49,35 +43,16 @@ def backward_difference(slope: Kernel, newton: Newton, n: int, wrap: Wrap) -> tu
         evaluations = linearise(t, y, w, args)
         r, g = share(w, h)
         g *= h
-        line.factor(w, g)
         base = w[(spare + BASE) * n : (spare + BASE + 1) * n]
-        k = w[(FIRST_SLOPE + 1) * n : (FIRST_SLOPE + 2) * n]
-        value = w[(spare + VALUE) * n : (spare + VALUE + 1) * n]
-        change = w[(spare + RESIDUAL) * n : (spare + RESIDUAL + 1) * n]
-        atol, rtol = w[(spare + ATOL) * n : (spare + ATOL + 1) * n], w[(spare + RTOL) * n]
+        own = FIRST_SLOPE + 1
         w[length * n] = h
         for i in range(n):
             past = r * r * (y[i] - w[before * n + i])
             base[i] = y[i] + past / (1.0 + 2.0 * r)
-        copy(w[FIRST_SLOPE * n : (FIRST_SLOPE + 1) * n], k)
-        evaluated, last, verdict = 0, math.inf, 0
-        for iteration in range(iterations):
-            copy(base, end)
-            add(end, g, k, end)
-            slope(t + h, end, w, spare + VALUE, args)
-            copy(value, change)
-            add(change, -1.0, k, change)
-            evaluated += 1 + line.solve(t, y, w, args)
-            add(k, 1.0, change, k)
-            copy(base, end)
-            add(end, g, k, end)
-            size = abs(g) * norm(change, end, end, rtol, atol)
-            verdict = judge(size, last, iteration, rtol == EXACTLY)
-            if verdict != 0:
-                break
-            last = size
-        evaluations += evaluated
-        return evaluations if verdict > 0 else -evaluations
+        copy(w[FIRST_SLOPE * n : own * n], w[own * n : (own + 1) * n])
+        spent = settle(t + h, t, y, w, own, g, args)
+        copy(w[(spare + STATE) * n : (spare + STATE + 1) * n], end)
+        return evaluations + spent if spent > 0 else spent - evaluations
 
     @wrap.loop
     def error(t, y, end, w, h, rtol, atol, args):  # type: ignore[no-untyped-def]

@@ -46,9 +46,9 @@ def pieces(table: Explicit, slope: Kernel, wrap: Wrap, size: int | None) -> Piec
     @wrap.part
     def take(t, y, end, w, h, args):  # type: ignore[no-untyped-def]
         for i in range(1, last):
-            combine(i - 1, w, h)
+            combine(w, i - 1, h)
             slope(t + times[i] * h, end, w, FIRST_SLOPE + i, args)
-        combine(last - 1, w, h)
+        combine(w, last - 1, h)
         if reuses:
             slope(t + h, end, w, final, args)
             return last
@@ -89,11 +89,11 @@ def pieces(table: Explicit, slope: Kernel, wrap: Wrap, size: int | None) -> Piec
         if more:
             reach = w[spare * n : (spare + 1) * n]
             for i in range(more):
-                dense(i, w, h)
+                dense(w, i, h)
                 slope(t + dense_times[i] * h, reach, w, FIRST_SLOPE + last + i, args)
         hermite(w, n, final, spare, h)
         for i in range(count):
-            dense(more + i, w, h)
+            dense(w, more + i, h)
         return more
 
     @wrap.part

@@ -61,7 +61,8 @@ def _estimate(table: Implicit, frame: Frame, slope: Kernel, wrap: Wrap) -> Kerne
         estimate = w[(spare + ERROR) * n : (spare + ERROR + 1) * n]
         result = w[(spare + RESIDUAL) * n : (spare + RESIDUAL + 1) * n]
         evaluations = 0
-        for i in extra:
+        for place in range(extra.size):
+            i = extra[place]
             weigh(w, n, spare + STATE, 0, a[i, :i], h)
             slope(t + c[i] * h, state, w, FIRST_SLOPE + 1 + i, args)
             evaluations += 1
@@ -81,47 +82,16 @@ def _diagonal(
     """A method whose stages are solved one by one."""
     slopes = len(table.b) + 2
     shared = frame(slopes, np.ones((1, 1)), slope, newton, n, wrap)
-    spare, line, linearise, judge = shared.spare, shared.line, shared.linearise, shared.judge
+    spare, linearise, settle = shared.spare, shared.linearise, shared.settle
     a, b, c = np.array(table.a, float), np.array(table.b, float), np.array(table.c, float)
     extra = [i for i in table.spare_stages if i > 0]
     needed = np.array([i for i in range(len(b)) if i not in extra], np.int64)
-    iterations = newton.iterations
-
-    @wrap.loop
-    def stage(i, t, y, w, h, args):  # type: ignore[no-untyped-def]
-        """Newton's method for k_i = f(t + c_i h, base + h a_ii k_i); gives what `take` gives."""
-        own, g = FIRST_SLOPE + 1 + i, h * a[i, i]
-        k = w[own * n : (own + 1) * n]
-        base = w[(spare + BASE) * n : (spare + BASE + 1) * n]
-        state = w[(spare + STATE) * n : (spare + STATE + 1) * n]
-        value = w[(spare + VALUE) * n : (spare + VALUE + 1) * n]
-        change = w[(spare + RESIDUAL) * n : (spare + RESIDUAL + 1) * n]
-        atol, rtol = w[(spare + ATOL) * n : (spare + ATOL + 1) * n], w[(spare + RTOL) * n]
-        line.factor(w, g)
-        guess = own - 1 if i > 1 else FIRST_SLOPE
-        copy(w[guess * n : (guess + 1) * n], k)
-        evaluations, last, verdict = 0, math.inf, 0
-        for iteration in range(iterations):
-            copy(base, state)
-            add(state, g, k, state)
-            slope(t + c[i] * h, state, w, spare + VALUE, args)
-            copy(value, change)
-            add(change, -1.0, k, change)
-            evaluations += 1 + line.solve(t, y, w, args)
-            add(k, 1.0, change, k)
-            copy(base, state)
-            add(state, g, k, state)
-            size = abs(g) * norm(change, state, state, rtol, atol)
-            verdict = judge(size, last, iteration, rtol == EXACTLY)
-            if verdict != 0:
-                break
-            last = size
-        return evaluations if verdict > 0 else -evaluations
 
     @wrap.loop
     def take(t, y, end, w, h, args):  # type: ignore[no-untyped-def]
         evaluations = linearise(t, y, w, args)
-        for i in needed:
+        for place in range(needed.size):
+            i = needed[place]
             own = FIRST_SLOPE + 1 + i
             if i == 0 and a[i, i] == 0.0:
                 copy(w[FIRST_SLOPE * n : (FIRST_SLOPE + 1) * n], w[own * n : (own + 1) * n])
@@ -131,7 +101,9 @@ def _diagonal(
                 slope(t + c[i] * h, w[(spare + BASE) * n : (spare + BASE + 1) * n], w, own, args)
                 evaluations += 1
                 continue
-            spent = stage(i, t, y, w, h, args)
+            guess = own - 1 if i > 1 else FIRST_SLOPE
+            copy(w[guess * n : (guess + 1) * n], w[own * n : (own + 1) * n])
+            spent = settle(t + c[i] * h, t, y, w, own, h * a[i, i], args)
             evaluations += abs(spent)
             if spent < 0:
                 return -evaluations

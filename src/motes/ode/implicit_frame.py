@@ -8,10 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from motes.jit import jit
-from motes.ode.arithmetic import Array, Kernel
+from motes.ode.arithmetic import Array, Kernel, add, copy, norm
 from motes.ode.jacobian import (
     ATOL,
+    BASE,
     RESIDUAL,
+    RTOL,
+    STATE,
+    VALUE,
     Linear,
     Newton,
     Place,
@@ -72,6 +76,9 @@ class Frame(NamedTuple):
     filter: Linear
     linearise: Kernel
     judge: Kernel
+    settle: Kernel
+    """settle(time, t, y, w, own, g, args): Newton's method for k = f(time, base + g k) in row `own`
+    of the slopes, from what stands there; gives what `take` gives, and the state in its row."""
     room: Room
 
 
@@ -87,8 +94,42 @@ def frame(slopes: int, a: Array, slope: Kernel, newton: Newton, n: int, wrap: Wr
         filtering = solver(slope, newton, n, np.ones((1, 1)), after, wrap)
         rows += filtering.rows
     room = Room(slopes, place.solver + rows - spare, spare + ATOL)
-    linearise = linearisation(slope, newton, n, place, wrap)
-    return Frame(n, spare, line, filtering, linearise, judge(newton, wrap), room)
+    linearise, verdict = linearisation(slope, newton, n, place, wrap), judge(newton, wrap)
+    settle = _settling(slope, n, spare, line, newton.iterations, verdict, wrap)
+    return Frame(n, spare, line, filtering, linearise, verdict, settle, room)
+
+
+def _settling(
+    slope: Kernel, n: int, spare: int, line: Linear, iterations: int, judge: Kernel, wrap: Wrap
+) -> Kernel:
+    @wrap.loop
+    def settle(time, t, y, w, own, g, args):  # type: ignore[no-untyped-def]
+        k = w[own * n : (own + 1) * n]
+        base = w[(spare + BASE) * n : (spare + BASE + 1) * n]
+        state = w[(spare + STATE) * n : (spare + STATE + 1) * n]
+        value = w[(spare + VALUE) * n : (spare + VALUE + 1) * n]
+        change = w[(spare + RESIDUAL) * n : (spare + RESIDUAL + 1) * n]
+        atol, rtol = w[(spare + ATOL) * n : (spare + ATOL + 1) * n], w[(spare + RTOL) * n]
+        line.factor(w, g)
+        evaluations, last, verdict = 0, math.inf, 0
+        for iteration in range(iterations):
+            copy(base, state)
+            add(state, g, k, state)
+            slope(time, state, w, spare + VALUE, args)
+            copy(value, change)
+            add(change, -1.0, k, change)
+            evaluations += 1 + line.solve(t, y, w, args)
+            add(k, 1.0, change, k)
+            copy(base, state)
+            add(state, g, k, state)
+            size = abs(g) * norm(change, state, state, rtol, atol)
+            verdict = judge(size, last, iteration, rtol == EXACTLY)
+            if verdict != 0:
+                break
+            last = size
+        return evaluations if verdict > 0 else -evaluations
+
+    return settle
 
 
 def ends(slope: Kernel, slopes: int, wrap: Wrap) -> tuple[Kernel, Kernel]:

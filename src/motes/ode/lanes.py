@@ -1,4 +1,4 @@
-"""Many small systems at once: sixteen side by side, each with its own time and step.
+"""Many small systems at once: thirty-two side by side, each with its own time and step.
 
 Numbers of one component lie in one row for all lanes, so that a processor works on eight of them
 with one instruction. A lane whose system is done takes the next one; nothing that a lane does
@@ -13,11 +13,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from motes.generated import executed
 from motes.jit import EXACT, jit
 from motes.ode.arithmetic import Array, Kernel
+from motes.ode.march import LAST, NOW, SAFETY
 from motes.tableau import Explicit
 
-LANES = 16
+LANES = 32
+"""Systems side by side: latencies of some hide behind the others."""
 
 
 class Batch(NamedTuple):
@@ -33,23 +36,32 @@ class Batch(NamedTuple):
     """Evaluations, steps, rejected steps, and whether it failed, (4, m)."""
 
 
+WHOLE = 4503599627370496.0  # 2^52: above it, the last bit of a double counts 1.
+
+
 @jit(inline=True)
 def rough_power(x: float, p: float) -> float:
-    """x to the power p within 2 %, for x > 0, from the bits of x: enough to choose a step."""
+    """x to the power p within 2 %, for x > 0, from the bits of x: enough to choose a step.
+
+    Integers become doubles and back by their bits beside 2^52: processors have no instruction for
+    several at once.
+    """
     bits = np.float64(x).view(np.int64)
-    whole = (bits >> 52) - 1023
+    exponent = np.int64((bits >> 52) | 0x4330000000000000).view(np.float64) - WHOLE - 1023.0
     rest = np.int64((bits & 0xFFFFFFFFFFFFF) | 0x3FF0000000000000).view(np.float64) - 1.0
-    y = p * (whole + rest * (1.3333 - 0.3333 * rest))
-    k = math.floor(y)
+    y = p * (exponent + rest * (1.3333 - 0.3333 * rest))
+    k = np.floor(y)
     f = y - k
-    scale = np.int64((np.int64(k) + 1023) << 52).view(np.float64)
-    return scale * (1.0 + f * (0.6565 + 0.3435 * f))
+    scale = np.int64(np.float64(k + WHOLE + 1023.0).view(np.int64) << 52).view(np.float64)
+    return float(scale * (1.0 + f * (0.6565 + 0.3435 * f)))
 
 
 def march(f: Any, size: int, arguments: int, table: Explicit) -> Kernel:
     """A kernel that takes the systems `low` to `high` of a batch from t0 to t1.
 
-    f gets its state as a tuple of `size` numbers, and `arguments` further numbers.
+    f gets its state as a tuple of `size` numbers, and `arguments` further numbers. The kernel gets
+    the number of lanes as an argument: short loops of a known length would be written out, not
+    become SIMD.
     """
     rows = table.closed
     last = len(rows) - 1
@@ -63,31 +75,33 @@ def march(f: Any, size: int, arguments: int, table: Explicit) -> Kernel:
     power = 1.0 / table.order
 
     @jit
-    def run(t0, t1, batch, parameters, fixed, rtol, atol, limit, lower, upper):  # type: ignore[no-untyped-def]
+    def run(t0, t1, batch, parameters, fixed, rtol, atol, limit, lower, upper, width):  # type: ignore[no-untyped-def]
         y = np.zeros((size, LANES))
         end = np.zeros((size, LANES))
         error = np.zeros((size, LANES))
         zero = np.zeros((size, LANES))
         k = np.zeros((last + 1, size, LANES))
         a = np.zeros((arguments, LANES))
-        t = np.full(LANES, t1)
+        t = np.zeros(LANES)
         h = np.zeros(LANES)
         now = np.zeros(LANES)
         want = np.zeros(LANES)
         norm = np.zeros(LANES)
-        before = np.ones(LANES)
+        before = np.zeros(LANES)
         taken = np.zeros(LANES)
         refused = np.zeros(LANES)
-        system = np.full(LANES, -1)
+        system = np.zeros(LANES, np.int64)
         new = np.zeros(LANES, np.bool_)
         done = np.zeros(LANES, np.bool_)
         sign = 1.0 if t1 >= t0 else -1.0
         following = lower
         open_ones = upper - lower
         idle = True
+        for lane in range(width):
+            t[lane], before[lane], system[lane] = t1, 1.0, -1
         while open_ones > 0:
             if idle and following < upper:
-                for lane in range(LANES):
+                for lane in range(width):
                     if system[lane] < 0 and following < upper:
                         system[lane] = following
                         new[lane] = True
@@ -101,8 +115,8 @@ def march(f: Any, size: int, arguments: int, table: Explicit) -> Kernel:
                         taken[lane] = 0.0
                         refused[lane] = 0.0
                         following += 1
-                slope(t, y, a, end)
-                for lane in range(LANES):
+                slope(t, y, a, end, width)
+                for lane in range(width):
                     if new[lane]:
                         for c in range(size):
                             k[0, c, lane] = end[c, lane]
@@ -117,29 +131,29 @@ def march(f: Any, size: int, arguments: int, table: Explicit) -> Kernel:
                         want[lane] = min(abs(t1 - t0), max(1e-6 * abs(t1 - t0), trial))
                     new[lane] = False
             idle = False
-            for lane in range(LANES):
+            for lane in range(width):
                 step = abs(t1 - t[lane])
                 now[lane] = sign * (step if 1.01 * want[lane] >= step else want[lane])
             for i in range(1, last + 1):
-                combine(i, y, k, now, end)
-                for lane in range(LANES):
+                combine(i, y, k, now, end, width)
+                for lane in range(width):
                     h[lane] = t[lane] + times[i] * now[lane]
-                slope(h, end, a, k[i])
+                slope(h, end, a, k[i], width)
             if adaptive and not fixed:
-                estimate(0, zero, k, now, error)
-                for lane in range(LANES):
+                estimate(0, zero, k, now, error, width)
+                for lane in range(width):
                     norm[lane] = 0.0
                 for c in range(size):
-                    for lane in range(LANES):
+                    for lane in range(width):
                         scale = atol[c] + rtol * max(abs(y[c, lane]), abs(end[c, lane]))
                         norm[lane] += (error[c, lane] / scale) ** 2
-                for lane in range(LANES):
+                for lane in range(width):
                     e = math.sqrt(norm[lane] / size)
                     good = e <= 1.0
                     e = e if e < 1e10 else 1e10
                     e = e if e > 1e-10 else 1e-10
-                    kept = rough_power(before[lane], 0.2 * power)
-                    grow = 0.9 * rough_power(e, -0.85 * power) * kept
+                    kept = rough_power(before[lane], LAST * power)
+                    grow = SAFETY * rough_power(e, -NOW * power) * kept
                     shrink = 0.9 * rough_power(e, -power)
                     grow = min(10.0, max(0.2, grow))
                     shrink = min(0.9, max(0.1, shrink))
@@ -149,14 +163,14 @@ def march(f: Any, size: int, arguments: int, table: Explicit) -> Kernel:
                     before[lane] = max(e, 1e-4) if good else before[lane]
                     norm[lane] = 1.0 if good else 0.0
             else:
-                for lane in range(LANES):
+                for lane in range(width):
                     norm[lane] = 1.0
             for c in range(size):
-                for lane in range(LANES):
+                for lane in range(width):
                     good = norm[lane] > 0.0
                     y[c, lane] = end[c, lane] if good else y[c, lane]
                     k[0, c, lane] = k[last, c, lane] if good else k[0, c, lane]
-            for lane in range(LANES):
+            for lane in range(width):
                 good = norm[lane] > 0.0
                 reach = t[lane] + now[lane]
                 # The time of a fixed step is n h, never a sum.
@@ -172,7 +186,7 @@ def march(f: Any, size: int, arguments: int, table: Explicit) -> Kernel:
                 idle = idle or (done[lane] and system[lane] >= 0)
             if not idle:
                 continue
-            for lane in range(LANES):
+            for lane in range(width):
                 place = system[lane]
                 if place < 0 or not done[lane]:
                     continue
@@ -198,8 +212,8 @@ def _slope(f: Any, size: int, arguments: int) -> Kernel:
     state = "".join(f"y[{c}, lane], " for c in range(size))
     further = "".join(f", a[{c}, lane]" for c in range(arguments))
     lines = [
-        "def slope(t, y, a, out):",
-        f"    for lane in range({LANES}):",
+        "def slope(t, y, a, out, width):",
+        "    for lane in range(width):",
         f"        value = f(t[lane], ({state}){further})",
         *(f"        out[{c}, lane] = value[{c}]" for c in range(size)),
     ]
@@ -208,14 +222,14 @@ def _slope(f: Any, size: int, arguments: int) -> Kernel:
 
 def _combination(rows: Sequence[Sequence[float]]) -> Kernel:
     """combine(row, y, k, h, out): out = y + h sum_j rows[row][j] k[j], h differing by lane."""
-    lines = ["def combine(row, y, k, h, out):", "    pass"]
+    lines = ["def combine(row, y, k, h, out, width):", "    pass"]
     for number, row in enumerate(rows):
         terms = [f"{float(weight)!r} * k[{j}, c, lane]" for j, weight in enumerate(row) if weight]
         if terms:
             lines += [
                 f"    if row == {number}:",
                 "        for c in range(y.shape[0]):",
-                f"            for lane in range({LANES}):",
+                "            for lane in range(width):",
                 f"                out[c, lane] = y[c, lane] + h[lane] * ({' + '.join(terms)})",
             ]
     return _made(lines, "combine", {})
@@ -224,6 +238,5 @@ def _combination(rows: Sequence[Sequence[float]]) -> Kernel:
 def _made(lines: list[str], name: str, names: dict[str, Any]) -> Kernel:
     """A kernel from generated source: numbers of a table and of lanes stand in the machine code."""
     names = {"__name__": __name__, **names}
-    exec("\n".join(lines), names)
-    function: Callable[..., Any] = names[name]
-    return jit(function)
+    function: Callable[..., Any] = executed("\n".join(lines), names)[name]
+    return jit(function, inline=True)

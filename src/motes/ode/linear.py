@@ -17,7 +17,7 @@ KRYLOV = 60
 def implicit_matrix(jacobian: Array, a: Array, h: float, out: Array) -> None:
     """out = I - h a x jacobian (Kronecker), for a of (m, m); both matrices lie in one row each."""
     m = a.shape[0]
-    n = round(math.sqrt(jacobian.size))
+    n = int(math.sqrt(jacobian.size) + 0.5)
     for i in range(m):
         for j in range(m):
             share = h * a[i, j]
@@ -120,7 +120,7 @@ def orthogonalise(basis: Array, j: int, triangle: Array, turns: Array, right: Ar
         triangle[i, j] = turns[0, i] * upper + turns[1, i] * lower
         triangle[i + 1, j] = turns[0, i] * lower - turns[1, i] * upper
     upper = triangle[j, j]
-    length = math.hypot(upper, size)
+    length = math.sqrt(upper * upper + size * size)
     turns[0, j], turns[1, j] = (upper / length, size / length) if length > 0.0 else (1.0, 0.0)
     triangle[j, j] = length
     right[j + 1] = -turns[1, j] * right[j]

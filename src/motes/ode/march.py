@@ -21,6 +21,10 @@ RUNNING, DONE, STOPPED, TOO_SMALL, INFINITE, TOO_MANY = range(6)
 TIME, STEP, ERROR = range(3)
 """Places in `clock`: time, next step, logarithm of the last accepted step's error."""
 
+SAFETY, LAST, NOW = 0.87, 0.15, 0.9
+"""Step control: the next step is SAFETY x (last error)^(LAST / order) / (this one)^(NOW / order) as
+long. Chosen for the fewest evaluations at equal error, of eighth order, on six problems."""
+
 SMALL = math.log(1e-4)
 """The least that counts for the last step's error: one lucky step must not hold back the next."""
 
@@ -86,7 +90,8 @@ def partial_step(take: Kernel, wrap: Wrap) -> tuple[Kernel, Kernel]:
         if share == 0.0:
             copy(y, out)
             return 0
-        other, n = w.copy(), y.size
+        other, n = np.empty(w.size), y.size
+        copy(w, other)
         evaluations = abs(take(t, other[:n], other[n : 2 * n], other, share * h, args))
         copy(other[n : 2 * n], out)
         return evaluations
@@ -154,7 +159,7 @@ def steps(pieces: Pieces, room: Room, watch: Kernel, cross: Kernel, wrap: Wrap) 
             return trial
         better = max(1e-6, trial * 1e-3)
         if most > 1e-15:
-            better = (0.01 / most) ** (1.0 / control.order)
+            better = np.power(0.01 / most, 1.0 / control.order)
         return min(100.0 * trial, better, span)
 
     @wrap.loop
@@ -164,7 +169,7 @@ def steps(pieces: Pieces, room: Room, watch: Kernel, cross: Kernel, wrap: Wrap) 
         slope, following = w[FIRST_SLOPE * n : (FIRST_SLOPE + 1) * n], w[final * n : spare * n]
         asked, mesh_t, mesh_y = record.asked, record.mesh_t, record.mesh_y
         sign = 1.0 if control.stop >= control.start else -1.0
-        events = kinds.shape[0]
+        events, state = kinds.shape[0], np.empty(n)
         if counts[STEPS] == 0 and counts[REJECTED] == 0:
             counts[EVALUATIONS] += begin(clock[TIME], y, w, args)
             watch(clock[TIME], y, g[0], args)
@@ -207,14 +212,16 @@ def steps(pieces: Pieces, room: Room, watch: Kernel, cross: Kernel, wrap: Wrap) 
                 if not size <= 1.0:
                     counts[REJECTED] += 1
                     counts[RETRY] = 1
-                    shrink = 0.1 if not size < math.inf else 0.9 * size ** (-1.0 / control.order)
+                    shrink = 0.0
+                    if size < math.inf:
+                        shrink = 0.9 * np.power(size, -1.0 / control.order)
                     clock[STEP] = h * max(0.1, shrink)
                     if abs(clock[STEP]) <= 4e-16 * abs(t) or abs(clock[STEP]) < 1e-300:
                         counts[STATUS] = TOO_SMALL
                     continue
                 # Proportional and integral control: the last two errors choose the next step.
-                now = math.log(max(size, 1e-10))
-                grow = 0.9 * math.exp((0.2 * clock[ERROR] - 0.85 * now) / control.order)
+                now = np.log(max(size, 1e-10))
+                grow = SAFETY * np.exp((LAST * clock[ERROR] - NOW * now) / control.order)
                 grow = min(control.most, max(0.2, grow))
                 clock[STEP] = h * (min(1.0, grow) if counts[RETRY] else grow)
                 clock[ERROR] = max(now, SMALL)
@@ -235,18 +242,17 @@ def steps(pieces: Pieces, room: Room, watch: Kernel, cross: Kernel, wrap: Wrap) 
                 answer, time = record.answers[counts[ASKED]], asked[counts[ASKED]]
                 counts[ASKED] += 1
                 if time == after:
-                    copy(end, answer)
+                    answer[:] = end
                 else:
                     counts[EVALUATIONS] += inside((time - t) / h, t, y, w, h, answer, args)
             if counts[STATUS] == STOPPED:
-                state = np.empty(n)
                 counts[EVALUATIONS] += inside((reach - t) / h, t, y, w, h, state, args)
                 copy(state, end)
             clock[TIME] = reach
-            copy(end, y)
-            copy(following, slope)
+            y[:] = end
+            slope[:] = following
             if mesh_y.shape[0]:
-                copy(y, mesh_y[counts[MESH]])
+                mesh_y[counts[MESH]] = y
             mesh_t[counts[MESH]] = reach
             counts[MESH] += 1
             if counts[STATUS] == RUNNING and reach == control.stop:
@@ -292,8 +298,10 @@ def crossings(pieces: Pieces, watch: Kernel, wrap: Wrap) -> Kernel:
                     shares[e] = b
             copy(after, before)
             while True:
-                e = int(np.argmin(shares))
-                share = shares[e]
+                e, share = 0, math.inf
+                for other in range(kinds.shape[0]):
+                    if shares[other] < share:
+                        e, share = other, shares[other]
                 if share == math.inf:
                     break
                 shares[e] = math.inf

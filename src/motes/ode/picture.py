@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from motes.errors import MissingExtra
 from motes.integrate import table as find
+from motes.jit import jit
 from motes.ode.arithmetic import Array
+from motes.ode.right_hand_side import FirstOrder
 from motes.ode.solution import Work
 from motes.ode.solve import solve
 from motes.ode.solve_newton import solve_newton
@@ -28,6 +30,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 
 MARKS = "osD^vP*"
 HALVINGS = 5
+MOST = 1_000_000
+"""Steps of the longest solve that is drawn."""
 
 
 @dataclass(frozen=True)
@@ -44,15 +48,25 @@ class Run:
         return self.work.success and bool(np.isfinite(self.y).all())
 
 
+_machine_code = lru_cache(maxsize=64)(jit)
+"""Problems' functions as kernels, one of each."""
+
+
 def run(of: Problem, method: str, step: float | None, **options: Any) -> Run:
     """Solve a problem with fixed steps, or with `step` None within tolerances."""
     if isinstance(find(method), Splitting | Nystrom):
         if of.acceleration is None:
             raise ValueError(f"\"{method}\" is for x'' = a(t, x), which this problem is not")
         x, v = np.split(np.array(of.start), 2)
-        n = solve_newton(of.acceleration, x, v, of.span, method=method, step=step, **options)
+        a = _machine_code(of.acceleration)
+        n = solve_newton(a, x, v, of.span, method=method, step=step, **options)
         return Run(n.t, np.concatenate([n.x, n.v], axis=1), n)
-    r = solve(of.f, of.start, of.span, method=method, step=step, **options)
+    f: Any = of.slope
+    if of.acceleration is None:
+        f = _machine_code(f)
+    else:
+        f = FirstOrder(_machine_code(of.acceleration), (of.size,))
+    r = solve(f, of.start, of.span, method=method, step=step, **options)
     return Run(r.t, r.y, r)
 
 
@@ -77,25 +91,38 @@ def draw(
         ValueError: a method or step that makes no sense.
     """
     try:
-        from matplotlib.figure import Figure
+        from matplotlib import rc_context
     except ImportError:
         raise MissingExtra("pictures need Matplotlib: pip install 'motes[plot]'") from None
     of = problem(name)
-    chosen = tuple(methods or of.methods)
-    lengths = list(steps or (of.step,))
+    chosen = tuple(dict.fromkeys(methods or of.methods))
+    lengths = list(dict.fromkeys(steps or (of.step,)))
     if len(lengths) == 1:
         lengths = [lengths[0] / 2**k for k in range(HALVINGS)]
+    span = abs(of.span[1] - of.span[0])
+    if span / min(lengths) > MOST:
+        raise ValueError(
+            f"a step of {min(lengths):g} is too short for a picture: {span / min(lengths):.2g} of "
+            f"them fill the span, {MOST:g} at most are drawn"
+        )
+    with rc_context({"font.size": 12, "axes.titlesize": 13, "legend.fontsize": 11}):
+        return _figure(name, of, chosen, lengths)
+
+
+def _figure(name: str, of: Problem, chosen: tuple[str, ...], lengths: list[float]) -> Figure:
+    from matplotlib.figure import Figure
+
     reference = run(of, "verner9", None, rtol=1e-13, atol=1e-14)
     exact = of.exact(reference.t) if of.exact else reference.y
     runs = {method: [run(of, method, length) for length in lengths] for method in chosen}
     paint = {
         method: {"color": COLOURS[i % 7], "marker": MARKS[i % 7]} for i, method in enumerate(chosen)
     }
-    figure = Figure(figsize=(14, 7.5), layout="constrained")
+    figure = Figure(figsize=(14, 8), layout="constrained")
     panes = figure.subplot_mosaic("PPEK;PPSW", width_ratios=[1, 1, 1.1, 1.1])
-    figure.suptitle(about(name), fontsize=12, wrap=True)
+    figure.suptitle(about(name), fontsize=15, wrap=True)
     _paths(panes["P"], of, exact, {m: r[0] for m, r in runs.items()}, paint)
-    panes["P"].set_title(f"paths at step {lengths[0]:g}")
+    panes["P"].set_title(f"paths at step {lengths[0]:g}; grey: exact")
     errors = {m: [_error(r, exact[-1]) for r in rs] for m, rs in runs.items()}
     _errors(panes["E"], lengths, errors, paint)
     _kept(panes["K"], of, reference.t, exact, {m: r[0] for m, r in runs.items()}, paint)
@@ -132,7 +159,7 @@ def _paths(axes: Axes, of: Problem, exact: Array, runs: dict[str, Run], paint: A
         axes.set_aspect("equal")
     axes.set_xlabel(of.labels[0])
     axes.set_ylabel(of.labels[1])
-    axes.legend(loc="upper right", title="grey: exact", framealpha=0.95)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=3, frameon=False)
 
 
 def _field(axes: Axes, of: Problem) -> None:
@@ -147,27 +174,30 @@ def _field(axes: Axes, of: Problem) -> None:
         slope = of.f(of.span[0], state)
         u[place], v[place] = slope[i], slope[j]
     size = np.hypot(u, v) + 1e-300
-    axes.quiver(x, y, u / size, v / size, color="0.85", angles="xy", zorder=0, width=0.003)
+    axes.quiver(x, y, u / size, v / size, color="0.78", angles="xy", zorder=0, width=0.003)
 
 
 def _errors(axes: Axes, lengths: list[float], errors: dict[str, list[float]], paint: Any) -> None:
     for method, values in errors.items():
         error = np.array(values)
         good = np.isfinite(error) & (error > 1e-13) & (error < 1e3)
-        slope = ""
-        if good.sum() >= 2:
-            # The two shortest steps: the order shows where the error is small.
-            log_h, log_e = np.log(np.array(lengths)[good][-2:]), np.log(error[good][-2:])
-            slope = f": {np.diff(log_e)[0] / np.diff(log_h)[0]:.1f}"
+        log_h, log_e = np.log(np.array(lengths)[good]), np.log(error[good])
+        # The shortest two steps between which it still falls: the order shows where the error is
+        # small, but not yet rounding.
+        ratios = np.diff(log_e) / np.diff(log_h)
+        falling = ratios[ratios > 0.5]
+        slope = f": {falling[-1]:.1f}" if falling.size else ": far off"
         axes.loglog(
             np.array(lengths)[good], error[good], ms=5, lw=1.2, **paint[method],
             label=f"{method}{slope}",
         )  # fmt: skip
     axes.set_title("error at the end, and its slope")
-    axes.set_xticks(lengths, [f"{length:.3g}" for length in lengths])
+    axes.set_xticks(lengths, [f"{length:.2g}" for length in lengths])
     axes.minorticks_off()
     axes.set_xlabel("step")
-    axes.legend(fontsize=8)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low * (low / high) ** 0.55, high)  # Room for the legend below the lines.
+    axes.legend(fontsize=9, loc="lower right", ncols=2, columnspacing=1.0, handlelength=1.4)
     axes.grid(alpha=0.3)
 
 
@@ -189,7 +219,8 @@ def _kept(
             finite = np.abs(one.y).max(-1) < 1e6
             energy = of.energy(one.y[finite])
             error = np.abs(energy - energy[0]) / max(abs(energy[0]), 1e-300)
-            axes.plot(one.t[finite], np.maximum(error, 1e-16), lw=1.2, color=paint[method]["color"])
+            shown = np.maximum(error, 1e-16)[1:]
+            axes.plot(one.t[finite][1:], shown, lw=1.2, color=paint[method]["color"])
     axes.set_xlabel("time")
     axes.grid(alpha=0.3)
 
@@ -211,7 +242,7 @@ def _region(axes: Axes, of: Problem, method: str, step: float, exact: Array) -> 
     axes.set_xlabel("real part")
     axes.set_ylabel("imaginary part")
     axes.set_aspect("equal", adjustable="box")
-    axes.legend(fontsize=8, loc="upper right")
+    axes.legend(fontsize=9, loc="upper right", framealpha=0.95)
 
 
 def _jacobian(of: Problem, y: Array) -> Array:

@@ -4,20 +4,55 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
+from motes import jit as machine_code
 from motes.jit import EXACT, jit
-from motes.ode.arithmetic import Kernel
+from motes.ode.arithmetic import Kernel, copy
 
 Function = Callable[..., Any]
 
 
-def compiled(*functions: Function) -> bool:
+@dataclass(frozen=True)
+class FirstOrder:
+    """y' = (v, a(t, x, v)) for y = (x, v)."""
+
+    acceleration: Function
+    shape: tuple[int, ...]
+    """That of x."""
+
+    def __call__(self, t: Any, y: Any, *args: Any) -> Any:
+        """y' as one array."""
+        return np.stack([y[1], np.reshape(self.acceleration(t, *y, *args), self.shape)])
+
+
+@dataclass(frozen=True)
+class OfBoth:
+    """An event g(t, x, v) of a state y = (x, v)."""
+
+    function: Function
+
+    def __call__(self, t: Any, y: Any, *args: Any) -> Any:
+        """Its value for a state."""
+        return self.function(t, *y, *args)
+
+
+def compiled(*functions: Any) -> bool:
     """Whether all of these are Numba functions, so that a whole solve can be machine code."""
-    return all(isinstance(function, Dispatcher) for function in functions)
+    return all(
+        isinstance(_users(function), Dispatcher | machine_code.Kernel) for function in functions
+    )
+
+
+def _users(function: Any) -> Any:
+    """The function that the user wrote."""
+    if isinstance(function, FirstOrder):
+        return function.acceleration
+    return function.function if isinstance(function, OfBoth) else function
 
 
 class Wrap(NamedTuple):
@@ -33,7 +68,7 @@ COMPILED = Wrap(jit, lambda function: jit(function, inline=True))
 PLAIN = Wrap(lambda function: function, lambda function: function)
 
 
-def wrap(functions: Sequence[Function]) -> Wrap:
+def wrap(functions: Sequence[Any]) -> Wrap:
     """Whether these functions can be parts of machine code."""
     return COMPILED if compiled(*functions) else PLAIN
 
@@ -43,11 +78,16 @@ def slope(f: Function, shape: tuple[int, ...]) -> Kernel:
     size = math.prod(shape)
     if not compiled(f):
 
+        def line(t, y, w, row, args):  # type: ignore[no-untyped-def]
+            w[row * size : (row + 1) * size] = f(t, y, *args)
+
         def call(t, y, w, row, args):  # type: ignore[no-untyped-def]
             value = np.asarray(f(t, y.reshape(shape), *args))
             w[row * size : (row + 1) * size] = value.reshape(-1)
 
-        return call
+        return line if len(shape) == 1 else call
+    if isinstance(f, FirstOrder):
+        return _slope_of_both(f, size)
     f = _fused(f)
     if not shape:
 
@@ -68,6 +108,17 @@ def slope(f: Function, shape: tuple[int, ...]) -> Kernel:
         w[row * size : (row + 1) * size] = f(t, y.reshape(shape), *args).ravel()
 
     return jit(block)
+
+
+def _slope_of_both(f: FirstOrder, size: int) -> Kernel:
+    n, accelerate = size // 2, acceleration(f.acceleration, f.shape, 0)
+
+    def both(t, y, w, row, args):  # type: ignore[no-untyped-def]
+        first = row * size
+        copy(y[n:], w[first : first + n])
+        accelerate(t, y[:n], y[n:], w[first + n : first + size], args)
+
+    return jit(both)
 
 
 def acceleration(f: Function, shape: tuple[int, ...], skip: int) -> Kernel:
@@ -102,44 +153,13 @@ def acceleration(f: Function, shape: tuple[int, ...], skip: int) -> Kernel:
     return jit(block)
 
 
-def first_order(f: Function, shape: tuple[int, ...]) -> Function:
-    """y' = (v, f(t, x, v)) for y = (x, v) of shape (2, ...), compiled where f is."""
-    if not compiled(f):
-
-        def plain(t, y, *args):  # type: ignore[no-untyped-def]
-            return np.stack([y[1], np.asarray(f(t, y[0], y[1], *args)).reshape(shape)])
-
-        return plain
-    write = acceleration(f, shape, 0)
-
-    def pair(t, y, *args):  # type: ignore[no-untyped-def]
-        out = np.empty_like(y)
-        out[0] = y[1]
-        flat = out.reshape(-1)
-        both = y.reshape(-1)
-        n = flat.size // 2
-        write(t, both[:n], both[n:], flat[n:], args)
-        return out
-
-    result: Function = jit(pair)
-    return result
-
-
-def of_position_and_velocity(event: Function) -> Function:
-    """g(t, y) with y = (x, v) from g(t, x, v), compiled where that is."""
-
-    def pair(t, y, *args):  # type: ignore[no-untyped-def]
-        return event(t, y[0], y[1], *args)
-
-    return jit(pair) if compiled(event) else pair
-
-
 def _fused(f: Any) -> Kernel:
-    """The same Numba function with fused multiply-add, which saves a fifth of its time.
+    """The same function with fused multiply-add, which saves a fifth of its time.
 
-    One that asks for more, such as parallel loops, checks of bounds or fast arithmetic, stays.
+    A Numba function that asks for more, such as parallel loops, checks of bounds or fast
+    arithmetic, stays.
     """
-    asked = {name for name, value in f.targetoptions.items() if value}
+    asked = {name for name, value in getattr(f, "targetoptions", {}).items() if value}
     return jit(f.py_func, flags=EXACT, inline=True) if asked <= _PLAIN_OPTIONS else f
 
 
@@ -156,7 +176,7 @@ def nothing(wrap: Wrap) -> Kernel:
     return watch
 
 
-def watcher(events: Sequence[Function], shape: tuple[int, ...], wrap: Wrap) -> Kernel | None:
+def watcher(events: Sequence[Any], shape: tuple[int, ...], wrap: Wrap) -> Kernel | None:
     """watch(t, y, g, args): the value of every event into g; None where there is none."""
     if not events:
         return None
@@ -174,8 +194,17 @@ def watcher(events: Sequence[Function], shape: tuple[int, ...], wrap: Wrap) -> K
     return chain
 
 
-def _link(before: Kernel, event: Function, place: int, shape: tuple[int, ...]) -> Kernel:
+def _link(before: Kernel, event: Any, place: int, shape: tuple[int, ...]) -> Kernel:
     """One more event after those before it: Numba cannot loop over functions of several types."""
+    if isinstance(event, OfBoth):
+        function = event.function
+
+        def pair(t, y, g, args):  # type: ignore[no-untyped-def]
+            before(t, y, g, args)
+            both = y.reshape(shape)
+            g[place] = function(t, both[0], both[1], *args)
+
+        return jit(pair)
     if not shape:
 
         def number(t, y, g, args):  # type: ignore[no-untyped-def]

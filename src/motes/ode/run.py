@@ -10,9 +10,9 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numba.core.dispatcher import Dispatcher
 from numpy.typing import ArrayLike
 
+from motes import jit
 from motes.ode import march, right_hand_side
 from motes.ode.arithmetic import Array, Kernel, worst
 from motes.ode.march import Control, Pieces, Record, Room
@@ -83,7 +83,7 @@ class March:
         if start == self.control.stop:
             counts[march.STATUS] = march.DONE
         # Only plain functions need it: what is not finite is found and said by the march.
-        quiet = nullcontext() if isinstance(self.machine.advance, Dispatcher) else _quiet()
+        quiet = nullcontext() if isinstance(self.machine.advance, jit.Kernel) else _quiet()
         portion = max(128, min(1024, 8192 // max(1, size)))
         zeros = 0 if not events else 64 + 4 * events
         record = self._record(portion, zeros)

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from motes.integrate import methods
 from motes.integrate import table as find
-from motes.ode import explicit, implicit, right_hand_side
+from motes.ode import additive, explicit, implicit, right_hand_side
 from motes.ode.arithmetic import Array
 from motes.ode.implicit_frame import EXACTLY
 from motes.ode.jacobian import Newton, NewtonKey
@@ -41,8 +42,9 @@ def solve(
     max_steps: int = MOST_STEPS,
     dense: bool = True,
     newton: Newton | None = None,
+    stiff: Function | None = None,
 ) -> Solution:
-    """Solve y' = f(t, y) from y0 over span = (t0, t1), forward or backward.
+    """Solve y' = f(t, y), or f + stiff, from y0 over span = (t0, t1), forward or backward.
 
     With `step`, steps are fixed (the last is shortened to end at t1), at t0 + n step; else the
     method's error estimate keeps the root mean square of error / (atol + rtol |y|) below 1 in each
@@ -64,6 +66,8 @@ def solve(
         max_steps: the solve gives up after as many.
         dense: whether to keep every step, so that the solution can be called with any time.
         newton: how implicit methods solve their equations.
+        stiff: a part g(t, y, *args) of y' = f + g, such as damping, which kencarp3 and kencarp4
+            take implicitly while they take f explicitly. Newton's method then sees g alone.
 
     Returns:
         Times, states, events, work. Where no step can be found, `success` is False, `message` says
@@ -83,9 +87,13 @@ def solve(
     else:
         control = _adaptive(method, table, span, rtol, atol, largest_step, max_steps)
     functions = tuple(event.function for event in watched)
+    if stiff is not None and not getattr(table, "a_explicit", ()):
+        pairs = [name for name, t in methods().items() if getattr(t, "a_explicit", ())]
+        raise ValueError(f'"{method}" takes y\' whole; {" and ".join(pairs)} take a stiff part')
     inner: tuple[Array | float, float] | None = None
     if isinstance(table, Implicit | Rosenbrock | BackwardDifference):
-        machine = _implicit(f, shape, method, functions, (newton or Newton()).key(start.size))
+        key = (newton or Newton()).key(start.size)
+        machine = _implicit(f, shape, method, functions, key, stiff)
         inner = (tolerances * 0.01, control.rtol * 0.01)
         if step is not None:
             inner = _size(start) * EXACTLY, EXACTLY
@@ -120,15 +128,26 @@ def _explicit(
 
 @lru_cache(maxsize=128)
 def _implicit(
-    f: Function, shape: tuple[int, ...], method: str, events: tuple[Function, ...], key: NewtonKey
+    f: Function,
+    shape: tuple[int, ...],
+    method: str,
+    events: tuple[Function, ...],
+    key: NewtonKey,
+    stiff: Function | None,
 ) -> Machine:
     table = find(method)
     assert isinstance(table, Implicit | Rosenbrock | BackwardDifference)
     size, newton = math.prod(shape), key.newton(math.prod(shape))
     given = () if newton.jacobian is None else (newton.jacobian,)
-    wrap = right_hand_side.wrap((f, *events, *given))
+    parts = (f,) if stiff is None else (f, stiff)
+    wrap = right_hand_side.wrap((*parts, *events, *given))
     watch = right_hand_side.watcher(events, shape, wrap)
-    slope = right_hand_side.slope(f, shape)
+    slopes = [right_hand_side.slope(part, shape) for part in parts]
+    if stiff is not None:
+        assert isinstance(table, Implicit)
+        pair = additive.additive(table, slopes[0], slopes[1], newton, size, wrap)
+        return Machine.build(*pair, watch, wrap)
+    slope = slopes[0]
     return Machine.build(*implicit.pieces(table, slope, newton, size, wrap), watch, wrap)
 
 

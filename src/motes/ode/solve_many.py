@@ -151,7 +151,19 @@ def _call(
     rtol: float, atol: float, limit: int, low: int, high: int,
 ) -> None:  # fmt: skip
     tolerances = np.full(len(batch.y), atol)
-    kernel(t0, t1, batch, parameters, step > 0, rtol, tolerances, float(limit), low, high)
+    kernel(
+        t0,
+        t1,
+        batch,
+        parameters,
+        step > 0,
+        rtol,
+        tolerances,
+        float(limit),
+        low,
+        high,
+        lanes.LANES,
+    )
 
 
 def _in_lanes(

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from motes.integrate import table as find
 from motes.ode import newton, right_hand_side
 from motes.ode.march import Room
+from motes.ode.right_hand_side import FirstOrder, OfBoth
 from motes.ode.run import Machine, March, as_events, asked, checked, fixed
 from motes.ode.solution import Event, NewtonSolution
 from motes.ode.solve import MOST_STEPS, solve
@@ -73,13 +74,11 @@ def solve_newton(
     if x.shape != v.shape:
         raise ValueError(f"x0 has shape {x.shape}, but v0 has {v.shape}")
     shape, both = (2, *x.shape), np.stack([x, v])
-    watched = tuple(
-        dataclasses.replace(e, function=_of_pair(e.function)) for e in as_events(events)
-    )
+    watched = tuple(dataclasses.replace(e, function=OfBoth(e.function)) for e in as_events(events))
     if not isinstance(table, Splitting | Nystrom):
         if drag is not None:
             raise ValueError(f'"{method}" takes drag as part of the acceleration')
-        f = _first_order(acceleration, x.shape)
+        f = FirstOrder(acceleration, x.shape)
         r = solve(
             f, both, span, method=method, step=step, at=at, events=watched, args=args,
             max_steps=max_steps, dense=dense, **options,
@@ -111,9 +110,6 @@ def solve_newton(
 _SHARED = (
     "evaluations", "steps", "rejected", "success", "message", "t", "events", "dense",
 )  # fmt: skip
-
-_first_order = lru_cache(maxsize=128)(right_hand_side.first_order)
-_of_pair = lru_cache(maxsize=128)(right_hand_side.of_position_and_velocity)
 
 
 def _rates(

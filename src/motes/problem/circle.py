@@ -2,10 +2,16 @@
 
 import numpy as np
 
-from motes.problem import Problem
+from motes.problem import Array, Problem
+
+
+def slope(t: float, y: Array) -> tuple[float, float]:
+    """A quarter turn of the place."""
+    return -y[1], y[0]
+
 
 problem = Problem(
-    slope=lambda t, y: (-y[1], y[0]),
+    slope=slope,
     start=(1.0, 0.0),
     span=(0.0, 2 * np.pi),
     step=0.25,

@@ -7,6 +7,11 @@ from motes.problem import Array, Problem
 RATE = 50.0
 
 
+def slope(t: float, y: Array) -> tuple[float, float]:
+    """y holds x and the time."""
+    return -RATE * (y[0] - np.cos(y[1])), 1.0
+
+
 def exact(t: Array) -> Array:
     """The slow part, and what is left of the start."""
     share = RATE / (1 + RATE**2)
@@ -15,7 +20,7 @@ def exact(t: Array) -> Array:
 
 
 problem = Problem(
-    slope=lambda t, y: (-RATE * (y[0] - np.cos(y[1])), 1.0),
+    slope=slope,
     start=(0.2, 0.0),
     span=(0.0, 2.0),
     step=0.041,

@@ -9,7 +9,7 @@ GRAVITY = 9.81
 
 def slope(t: float, y: Array) -> tuple[float, float, float, float]:
     """Angles a, b and their speeds; unit masses and lengths."""
-    a, b, u, w = y
+    a, b, u, w = y[0], y[1], y[2], y[3]
     c, s = np.cos(a - b), np.sin(a - b)
     below = 2 - c * c
     up = -GRAVITY * (2 * np.sin(a) - c * np.sin(b)) - s * (w * w + c * u * u)

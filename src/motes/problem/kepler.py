@@ -2,10 +2,17 @@
 
 import numpy as np
 
-from motes.problem import Problem
+from motes.problem import Array, Problem
+
+
+def acceleration(t: float, x: Array, v: Array) -> tuple[float, float]:
+    """Gravity, GM = 1."""
+    cube = (x[0] * x[0] + x[1] * x[1]) ** 1.5
+    return -x[0] / cube, -x[1] / cube
+
 
 problem = Problem(
-    acceleration=lambda t, x, v: -x / np.hypot(x[0], x[1]) ** 3,
+    acceleration=acceleration,
     start=(0.5, 0.0, 0.0, np.sqrt(3.0)),
     span=(0.0, 6 * np.pi),
     step=0.05,

@@ -2,10 +2,16 @@
 
 import numpy as np
 
-from motes.problem import Problem
+from motes.problem import Array, Problem
+
+
+def acceleration(t: float, x: Array, v: Array) -> tuple[float]:
+    """Gravity along the arc."""
+    return (-np.sin(x[0]),)
+
 
 problem = Problem(
-    acceleration=lambda t, x, v: -np.sin(x),
+    acceleration=acceleration,
     start=(2.8, 0.0),
     span=(0.0, 25.0),
     step=0.2,

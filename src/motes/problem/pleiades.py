@@ -12,11 +12,16 @@ MASS = np.arange(1.0, 8.0)
 
 def acceleration(t: float, x: Array, v: Array) -> Array:
     """Gravity, G = 1; x holds seven abscissae, then seven ordinates."""
-    p = x.reshape(2, 7)
-    d = p[:, None, :] - p[:, :, None]
-    r = np.sqrt((d**2).sum(0)) + np.eye(7)
-    pull: Array = (MASS * d / r**3).sum(-1)
-    return pull.reshape(-1)
+    pull = np.zeros(14)
+    for i in range(7):
+        for j in range(i):
+            dx, dy = x[j] - x[i], x[7 + j] - x[7 + i]
+            share = 1.0 / (dx * dx + dy * dy) ** 1.5
+            pull[i] += MASS[j] * share * dx
+            pull[7 + i] += MASS[j] * share * dy
+            pull[j] -= MASS[i] * share * dx
+            pull[7 + j] -= MASS[i] * share * dy
+    return pull
 
 
 problem = Problem(

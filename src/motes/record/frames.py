@@ -14,6 +14,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import NDArray
+
 from motes.errors import OutputError
 from motes.files import content, fault, sweep, written_whole
 from motes.frame import Frame
@@ -54,7 +56,7 @@ class FrameStore:
 
     `store.write(frame)` keeps one, `store.read(12)` gives one back exactly, `store.numbers()` says
     which there are. Beside frames of a scene with interactions, `store.measures()` has energy,
-    momentum and virial ratio by frame.
+    momentum and virial ratio by frame, and `store.captures()` who caught whom.
     """
 
     folder: Path
@@ -159,14 +161,17 @@ class FrameStore:
             raise OutputError(f"{path} is damaged: it holds frame {frame.index}.")
         return frame
 
-    def note(self, number: int, measures: Measures) -> None:
-        """Keep energy, momentum and the rest beside a frame.
+    def note(self, number: int, measures: Measures, captures: NDArray[Any] | None = None) -> None:
+        """Keep energy, momentum and the rest beside a frame, and captures since the frame before.
 
         Raises:
             OutputError: the file cannot be written.
         """
+        told = () if captures is None else captures
+        each = [{key: one[key].tolist() for key in one.dtype.names} for one in told]
+        noted = {**to_json(measures), "captures": each}
         with written_whole(self._notes(number)) as file:
-            file.write(json.dumps(to_json(measures)).encode() + b"\n")
+            file.write(json.dumps(noted).encode() + b"\n")
 
     def measures(self) -> dict[int, Measures]:
         """What was noted beside each frame, by its number, in order.
@@ -174,15 +179,27 @@ class FrameStore:
         Raises:
             OutputError: a file is damaged.
         """
-        found = {}
+        return {number: measures for number, measures, _ in self._noted()}
+
+    def captures(self) -> list[dict[str, Any]]:
+        """Captures up to the last frame, in order: time [s], hunter and prey (ids), place [m].
+
+        Raises:
+            OutputError: a file is damaged.
+        """
+        return [one for _, _, captures in self._noted() for one in captures]
+
+    def _noted(self) -> Iterator[tuple[int, Measures, list[dict[str, Any]]]]:
+        """Frame numbers with what was noted beside them."""
         for number in self.numbers():
             path = self._notes(number)
             if path.is_file():
                 try:
-                    found[number] = from_json(json.loads(content(path)))
-                except (ValueError, TypeError) as error:
+                    noted = json.loads(content(path))
+                    captures = noted.pop("captures", [])
+                    yield number, from_json(noted), list(captures)
+                except (ValueError, TypeError, AttributeError) as error:
                     raise OutputError(f"{path} is damaged: it holds no measures.") from error
-        return found
 
     def _notes(self, number: int) -> Path:
         return self.folder / f"{number:05d}.measures.json"

@@ -20,74 +20,89 @@ Array = NDArray[np.float32]
 ROWS = 16
 """Rows of pixels per task."""
 
-_ZERO = np.float32(0)
+CHANNELS = 4
+"""Numbers of a pixel: red, green, blue, alpha."""
+
+OUTER, INNER = np.float32(1 / 8), np.float32(3 / 8)
+"""Weights of four pixels that become one."""
+
+FAR, NEAR = np.float32(1 / 4), np.float32(3 / 4)
+"""Weights of two pixels that meet in one of twice as many."""
 
 
 def bloom(image: Array, film: Film) -> None:
-    """Spread the colour of image (h, w, 4) in place; alpha stays."""
+    """Spread the colour of image (h, w, 4), contiguous, in place; alpha stays."""
     octaves = min(film.bloom_radius, int(np.log2(max(min(image.shape[:2]) // 4, 1))))
     if film.bloom <= 0 or octaves < 1:
         return
     pyramid = [image]
     for _ in range(octaves):
         height, width = pyramid[-1].shape[:2]
-        smaller = np.zeros((-(-height // 2), -(-width // 2), 4), np.float32)
-        _resample(pyramid[-1], smaller, 2, 0.0, 1.0)
-        pyramid.append(smaller)
+        pyramid.append(np.empty((-(-height // 2), -(-width // 2), 4), np.float32))
+        _by_rows(_halve, pyramid[-2], pyramid[-1])
     # From the widest to the finest: each holds the mean of itself and all that are wider.
     for octave in range(octaves, 1, -1):
-        wider = np.float32((octaves - octave + 1) / (octaves - octave + 2))
-        _resample(pyramid[octave], pyramid[octave - 1], 1, float(1 - wider), float(wider))
-    _resample(pyramid[1], image, 1, 1 - film.bloom, film.bloom)
+        wider = (octaves - octave + 1) / (octaves - octave + 2)
+        _by_rows(_double, pyramid[octave], pyramid[octave - 1], 1 - wider, wider)
+    _by_rows(_double, pyramid[1], image, 1 - film.bloom, film.bloom)
 
 
-def _resample(source: Array, target: Array, factor: int, keep: float, gain: float) -> None:
-    """target = keep target + gain (source halved for factor 2, doubled for factor 1)."""
+def _by_rows(kernel: Any, source: Array, target: Array, *mix: float) -> None:
+    """Let the threads share the rows of the target, each of `CHANNELS` numbers a pixel."""
     tasks = blocks(len(target), ROWS)
-    keep_gain = np.array([keep, gain], np.float32)
-    columns = _taps(target.shape[1], source.shape[1], factor)
-    rows = _taps(target.shape[0], source.shape[0], factor)
-
-    def task(number: int) -> None:
-        part = slice(*tasks[number])
-        _gather(source, rows[0][part], rows[1][part], *columns, keep_gain, target[part])
-
-    share(task, len(tasks))
-
-
-def _taps(count: int, size: int, factor: int) -> tuple[NDArray[np.int32], Array]:
-    """Source index within `size` and weight of each target pixel of an axis, (count, 2 factor)."""
-    target = np.arange(count)[:, None]
-    if factor == 2:
-        index = 2 * target + np.arange(-1, 3)
-        weight = np.broadcast_to(np.array([1, 3, 3, 1]) / 8, index.shape)
-    else:
-        index = (target + np.array([-1, 1])) // 2
-        weight = np.where(target % 2 == [0, 1], 0.25, 0.75)
-    return np.clip(index, 0, size - 1).astype(np.int32), np.array(weight, np.float32, order="C")
+    lines, rows = source.reshape(len(source), -1), target.reshape(len(target), -1)
+    numbers = tuple(map(np.float32, mix))
+    share(lambda number: kernel(lines, rows, *numbers, *tasks[number]), len(tasks))
 
 
 @jit
-def _gather(
-    source: Any, rows: Any, row_weight: Any, columns: Any, column_weight: Any, mix: Any, target: Any
-) -> None:
-    """Separable weighted sum of source pixels, mixed into the target."""
-    width = source.shape[1]
-    line = np.empty((width, 4), np.float32)
-    for y in range(target.shape[0]):
-        line[:] = _ZERO
-        for j in range(rows.shape[1]):
-            row, w = rows[y, j], row_weight[y, j]
-            for x in range(width):
-                for k in range(4):
-                    line[x, k] += w * source[row, x, k]
-        for x in range(target.shape[1]):
-            red, green, blue = _ZERO, _ZERO, _ZERO
-            for i in range(columns.shape[1]):
-                column, w = columns[x, i], column_weight[x, i]
-                red += w * line[column, 0]
-                green += w * line[column, 1]
-                blue += w * line[column, 2]
-            target[y, x, 0] = mix[0] * target[y, x, 0] + mix[1] * red
-            target[y, x, 1] = mix[0] * target[y, x, 1] + mix[1] * green
-            target[y, x, 2] = mix[0] * target[y, x, 2] + mix[1] * blue
+def _halve(source: Any, target: Any, low: Any, high: Any) -> None:
+    """target = source at half the size: (1, 3, 3, 1)/8 along columns, then along rows."""
+    height, numbers = source.shape
+    line = np.empty(numbers + 4 * CHANNELS, np.float32)  # Two pixels of border at either end.
+    inner, out = line[2 * CHANNELS :][:numbers], target.shape[1] // CHANNELS
+    for y in range(low, high):
+        a, b = source[max(2 * y - 1, 0)], source[2 * y]
+        c, d = source[min(2 * y + 1, height - 1)], source[min(2 * y + 2, height - 1)]
+        for i in range(numbers):
+            inner[i] = OUTER * (a[i] + d[i]) + INNER * (b[i] + c[i])
+        _extend(line)
+        row = target[y]
+        for x in range(out):
+            for k in range(CHANNELS):
+                i = (2 * x + 1) * CHANNELS + k
+                outer = line[i] + line[i + 3 * CHANNELS]
+                row[x * CHANNELS + k] = OUTER * outer + INNER * (
+                    line[i + CHANNELS] + line[i + 2 * CHANNELS]
+                )
+
+
+@jit
+def _double(source: Any, target: Any, keep: Any, gain: Any, low: Any, high: Any) -> None:
+    """target = keep target + gain (source at twice the size), in its colours."""
+    height, numbers = source.shape
+    line = np.empty(numbers + 4 * CHANNELS, np.float32)
+    inner, out = line[2 * CHANNELS :][:numbers], target.shape[1] // CHANNELS
+    near, far = gain * NEAR, gain * FAR
+    for y in range(low, high):
+        a = source[y // 2]
+        b = source[min(max(y // 2 + 2 * (y % 2) - 1, 0), height - 1)]
+        for i in range(numbers):
+            inner[i] = NEAR * a[i] + FAR * b[i]
+        _extend(line)
+        row = target[y]
+        for x in range(out):
+            i = (x // 2 + 2) * CHANNELS
+            j = i + (2 * (x % 2) - 1) * CHANNELS
+            for k in range(3):
+                light = near * line[i + k] + far * line[j + k]
+                row[x * CHANNELS + k] = keep * row[x * CHANNELS + k] + light
+
+
+@jit(inline=True)
+def _extend(line: Any) -> None:
+    """Let the two pixels of border at either end of a line be as the last ones within."""
+    last = line.size - 3 * CHANNELS
+    for k in range(CHANNELS):
+        line[k] = line[CHANNELS + k] = line[2 * CHANNELS + k]
+        line[last + CHANNELS + k] = line[last + 2 * CHANNELS + k] = line[last + k]

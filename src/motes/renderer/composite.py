@@ -188,13 +188,15 @@ def composite(
                 if clearest < OPAQUE:
                     break
         for b in range(rows):
+            line = buffer[np.int64(b) * np.int64(_STRIDE) :]
+            red_of, green_of, blue_of = line[:columns], line[_GREEN:], line[_BLUE:]
+            clear_of = line[_CLEAR:]
+            shown = image[top + b, left : left + columns]
+            under = backdrop[top + b, left : left + columns]
             for a in range(columns):
-                place = np.uint64(b) * _STRIDE + np.uint64(a)
-                clear = buffer[place + _CLEAR]
+                clear = clear_of[a]
                 behind = clear if final else _ZERO
-                for k in range(3):
-                    light = buffer[place + np.uint64(k) * _PLANE]
-                    image[top + b, left + a, k] = light + behind * backdrop[top + b, left + a, k]
-                if final:
-                    clear = _ONE - clear * (_ONE - backdrop[top + b, left + a, 3])
-                image[top + b, left + a, 3] = clear
+                shown[a, 0] = red_of[a] + behind * under[a, 0]
+                shown[a, 1] = green_of[a] + behind * under[a, 1]
+                shown[a, 2] = blue_of[a] + behind * under[a, 2]
+                shown[a, 3] = _ONE - clear * (_ONE - under[a, 3]) if final else clear

@@ -13,6 +13,9 @@ from motes.files import written_whole
 from motes.renderer.film import Film
 from motes.renderer.tone import develop
 
+PNG_LEVEL = 3
+"""How hard PNG files are packed: 6, the usual, takes three times as long for the same size."""
+
 
 @dataclass(frozen=True, eq=False)
 class Picture:
@@ -50,7 +53,8 @@ class Picture:
 
                 clear = suffix in (".png", ".webp") and bool((self.linear[..., 3] < 1 / 512).any())
                 pixels = self._with_alpha() if clear else self.pixels
-                Image.fromarray(pixels).save(file, formats[suffix], quality=92)
+                image = Image.fromarray(pixels)
+                image.save(file, formats[suffix], quality=92, compress_level=PNG_LEVEL)
 
     def _with_alpha(self) -> NDArray[np.uint8]:
         """Straight red, green, blue and alpha that give `pixels` over black.

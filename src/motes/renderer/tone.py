@@ -70,35 +70,67 @@ def develop(linear: Array, film: Film) -> NDArray[np.uint8]:
 def _develop(
     linear: Any, into: Any, curve: Any, out: Any, code: Any, dither: Any, first: Any, pixels: Any
 ) -> None:
-    mapped = np.empty(3, np.float32)
+    """Row by row and step by step, so that all but the looking up is done on SIMD registers."""
+    width = linear.shape[1]
+    cells, parts = np.empty((3, width), np.uint32), np.empty((3, width), np.float32)
+    c0, c1, c2 = cells[0], cells[1], cells[2]
+    p0, p1, p2 = parts[0], parts[1], parts[2]
+    noise = np.empty(width, np.float32)
+    for x in range(width):
+        noise[x] = np.float32(0.5)
     for y in range(linear.shape[0]):
-        for x in range(linear.shape[1]):
-            for k in range(3):
-                light = _ZERO
-                for j in range(3):
-                    light += into[k, j] * linear[y, x, j]
-                if not light > _DIMMEST:  # Also NaN.
-                    light = _DIMMEST
-                bits = np.float32(min(light, _BRIGHTEST)).view(np.uint32) - _FIRST_BITS
-                cell = bits >> _SHIFT
-                low = curve[cell]
-                part = np.float32(bits & _FRACTION) * _PER_CELL
-                mapped[k] = low + part * (curve[cell + np.uint32(1)] - low)
-            # Interleaved gradient noise (Jimenez 2014): uniform, without visible grain.
-            noise = np.float32(0.5)
-            if dither:
-                noise = np.float32(0.06711056) * np.float32(x)
-                noise += np.float32(0.00583715) * np.float32(y + first)
-                noise = np.float32(52.9829189) * (noise - np.floor(noise))
-                noise -= np.floor(noise)
-            for k in range(3):
-                value = out[k, 0] * mapped[0] + out[k, 1] * mapped[1] + out[k, 2] * mapped[2]
-                value = min(max(value, _ZERO), _ONE) * np.float32(_CODES)
-                cell = min(np.uint32(value), np.uint32(_CODES - 1))
-                low = code[cell]
-                part = value - np.float32(cell)
-                level = low + part * (code[cell + np.uint32(1)] - low)
-                pixels[y, x, k] = np.uint8(level * np.float32(255) + noise)
+        light = linear[y]
+        for x in range(width):
+            red, green, blue = light[x, 0], light[x, 1], light[x, 2]
+            c0[x], p0[x] = _octave(into[0, 0] * red + into[0, 1] * green + into[0, 2] * blue)
+            c1[x], p1[x] = _octave(into[1, 0] * red + into[1, 1] * green + into[1, 2] * blue)
+            c2[x], p2[x] = _octave(into[2, 0] * red + into[2, 1] * green + into[2, 2] * blue)
+        _look_up(curve, c0, c1, c2, p0, p1, p2)
+        for x in range(width):
+            red, green, blue = p0[x], p1[x], p2[x]
+            c0[x], p0[x] = _step(out[0, 0] * red + out[0, 1] * green + out[0, 2] * blue)
+            c1[x], p1[x] = _step(out[1, 0] * red + out[1, 1] * green + out[1, 2] * blue)
+            c2[x], p2[x] = _step(out[2, 0] * red + out[2, 1] * green + out[2, 2] * blue)
+        _look_up(code, c0, c1, c2, p0, p1, p2)
+        if dither:  # Interleaved gradient noise (Jimenez 2014): uniform, without visible grain.
+            row = np.float32(0.00583715) * np.float32(y + first)
+            for x in range(width):
+                wave = np.float32(0.06711056) * np.float32(np.int32(x)) + row
+                wave = np.float32(52.9829189) * (wave - np.floor(wave))
+                noise[x] = wave - np.floor(wave)
+        shown = pixels[y]
+        for x in range(width):
+            shown[x, 0] = np.uint8(np.int32(p0[x] * np.float32(255) + noise[x]))
+            shown[x, 1] = np.uint8(np.int32(p1[x] * np.float32(255) + noise[x]))
+            shown[x, 2] = np.uint8(np.int32(p2[x] * np.float32(255) + noise[x]))
+
+
+@jit(inline=True)
+def _octave(light: Any) -> Any:
+    """Cell of the curve's table, and how far light is within it."""
+    light = light if light > _DIMMEST else _DIMMEST  # Also where it is NaN.
+    bits = np.float32(min(light, _BRIGHTEST)).view(np.uint32) - _FIRST_BITS
+    return np.uint32(bits >> _SHIFT), np.float32(np.int32(bits & _FRACTION)) * _PER_CELL
+
+
+@jit(inline=True)
+def _step(value: Any) -> Any:
+    """Cell of the code's table, and how far a value is within it."""
+    value = min(max(value, _ZERO), _ONE) * np.float32(_CODES)
+    cell = np.int32(min(np.int32(value), np.int32(_CODES - 1)))
+    return np.uint32(cell), value - np.float32(cell)
+
+
+@jit(inline=True)
+def _look_up(table: Any, c0: Any, c1: Any, c2: Any, p0: Any, p1: Any, p2: Any) -> None:
+    """Put into each part what the table has there."""
+    for x in range(p0.size):
+        low = table[c0[x]]
+        p0[x] = low + p0[x] * (table[c0[x] + np.uint32(1)] - low)
+        low = table[c1[x]]
+        p1[x] = low + p1[x] * (table[c1[x] + np.uint32(1)] - low)
+        low = table[c2[x]]
+        p2[x] = low + p2[x] * (table[c2[x] + np.uint32(1)] - low)
 
 
 @cache

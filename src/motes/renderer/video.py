@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.files import finished, written_whole
+from motes.renderer.picture import PNG_LEVEL
 
 Pixels = NDArray[np.uint8]
 
 _CODECS: dict[str, tuple[str, str, str, dict[str, str]]] = {
     # suffix: container, codec, pixel format, settings. The settings, the number of threads
     # included, are fixed so that the same frames give the same file.
-    ".mp4": ("mp4", "libx264", "yuv420p", {"crf": "17", "preset": "veryfast"}),
+    ".mp4": ("mp4", "libx264", "yuv420p", {"crf": "17", "preset": "superfast"}),
     ".webp": ("webp", "libwebp_anim", "yuv420p", {"quality": "85", "compression_level": "2"}),
 }
 
@@ -174,4 +175,4 @@ def contact_sheet(
         )
         draw.text((left + 2, top + tall + 5), f"t = {time:.2f} s", fill=(190, 190, 195), font=font)
     with written_whole(Path(path)) as file:
-        sheet.save(file, "PNG")
+        sheet.save(file, "PNG", compress_level=PNG_LEVEL)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from motes.catalog import Component
@@ -39,6 +40,11 @@ class Place:
     words: tuple[str, ...]
     """The address with the list that the component is in: water, emit, cone, rate."""
     path: tuple[str | int, ...]
+
+    def spellings(self) -> tuple[str, ...]:
+        """The address with the component's own name, with its list's, and with both."""
+        by_list = (*self.words[:-2], self.words[-1])
+        return self.address, ".".join(by_list), ".".join(self.words)
 
     def answers(self, words: list[str]) -> bool:
         """Whether `words` are the place's own in order, with some but the last left out."""
@@ -117,7 +123,7 @@ def _unclear(address: str, found: list[Place], menu: list[Place]) -> str:
         return f'"{address}" stands for several values: {shown}{more}. Write one of them.'
     last = address.split(".")[-1]
     ends = [place.address for place in menu if place.words[-1] == last]
-    hint = likely(address, ends) or likely(address, [place.address for place in menu])
+    hint = likely(address, ends) or likely(address, chain(*(place.spellings() for place in menu)))
     shown = f" It could be: {', '.join(ends[:MOST_SHOWN])}." if ends and not hint else ""
     return f'no value has the address "{address}".{hint}{shown} `Scene.addresses` lists them.'
 

@@ -146,7 +146,7 @@ def _avoid(
             q = room.nearest[k]
             px, py = np.float64(others[0, q]) - x, np.float64(others[1, q]) - y
             nx, ny, c = contact(px, py, mine + radius[room.row[q]], rules.step)
-            if c > -rules.top_speed:
+            if c > -top:
                 _note(room.planes, hard, nx, ny, c)
                 hard += 1
         held = hard
@@ -157,8 +157,9 @@ def _avoid(
             ux, uy = vx - velocity[0, j], vy - velocity[1, j]
             both = mine + radius[j] + rules.margin
             plane = reciprocal(px, py, ux, uy, vx, vy, both, rules.horizon, rules.step)
-            _note(room.planes, held, plane[0], plane[1], plane[2])
-            held += 1
+            if plane[2] > -top:  # Else all velocities up to the top speed keep to it.
+                _note(room.planes, held, plane[0], plane[1], plane[2])
+                held += 1
         out[0, i], out[1, i] = allowed(room.planes, hard, held, top, gx, gy, room.other)
     return end, np.int64(0)
 
