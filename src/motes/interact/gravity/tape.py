@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from llvmlite import ir
@@ -42,15 +43,16 @@ class Note:
         return self._with(other, "+")
 
     def __sub__(self, other: Any) -> Note:
-        return self + other * -1.0
+        return self._with(-self.tape.note(other), "+")
 
     def __mul__(self, other: Any) -> Note:
         return self._with(other, "*")
 
-    __rmul__ = __mul__
+    def __rmul__(self, other: Any) -> Note:
+        return self._with(other, "*")
 
     def __neg__(self) -> Note:
-        return self * -1.0
+        return self._with(-1.0, "*")
 
     def straight(self) -> Any:
         """The lanes now, by straight-line code."""
@@ -134,7 +136,7 @@ class Tape:
         for first in self.first:
             first()
         sums = [note for note in self.notes if note.kind == "sum"]
-        before = set()
+        before: set[Note] = set()
         for note in reversed(self.notes):
             if note.kind == "sum" or note in before:
                 before.update(note.needs())
@@ -142,13 +144,13 @@ class Tape:
         self._steps([note for note in others if note in before])
         self._sums(sums)
         self._steps([note for note in others if note not in before])
-        first = len(self.place)
+        size = len(self.place)
         one, zero = self.constants[1.0], self.constants[0.0]
-        copies = [(first + k, note, one, zero) for k, note in enumerate(self.kept)]
-        assert first + len(copies) <= ROOM, "the formula needs more room"
+        copies = [(size + k, note, one, zero) for k, note in enumerate(self.kept)]
+        assert size + len(copies) <= ROOM, "the formula needs more room"
         self._loop([(d, *map(self.place.__getitem__, parts)) for d, *parts in copies])
         for use in self.later:
-            use(first)
+            use(size)
 
     def _steps(self, notes: list[Note]) -> None:
         """Code for sums and products of two, where a product of one use joins the sum."""
@@ -269,7 +271,7 @@ class Array:
     def rows(self, count: int) -> list[Note]:
         """The first rows."""
         tape = self.tape
-        notes = [tape.known(lambda k=k: self.array[k]) for k in range(count)]
+        notes = [tape.known(partial(self.array.__getitem__, k)) for k in range(count)]
         place = tape.place[notes[0]]
 
         def read(k: Any) -> None:
@@ -300,7 +302,7 @@ class Array:
         def now(k: int) -> Any:
             return gathering(self.array, chosen.array)(k - k % step)[k % step]
 
-        notes = [tape.known(lambda k=k: now(k)) for k in range(whole)]
+        notes = [tape.known(partial(now, k)) for k in range(whole)]
         place = tape.place[notes[0]]
 
         def read() -> None:
