@@ -29,7 +29,8 @@ def traced(formula: Callable[..., None], looped: bool = False) -> Callable[..., 
     numbers. Both may be assigned to. With lanes, a number is that number in each lane.
     """
     if numba.config.DISABLE_JIT:
-        return formula
+        # As in machine code, what overflows or is 0 / 0 is no fault: such cells are not far.
+        return np.errstate(divide="ignore", invalid="ignore", over="ignore")(formula)
 
     def operation(typing: Any, *arguments: Any) -> Any:
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
