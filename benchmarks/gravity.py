@@ -4,7 +4,7 @@ Equal masses of a Plummer sphere, unsoftened. Errors are rms |a - a_direct| / rm
 particles, with direct sums in double precision. Each peer, where it is installed, runs at some of
 its own settings, and `gravity.acceleration` at a tolerance equal to the error that the peer was
 measured to have, so that a ratio of times never compares us with something more exact. Peers use as
-many threads as we do.
+many threads as we do. `--part NAME` measures one part, each in about a minute.
 """
 
 from __future__ import annotations
@@ -90,12 +90,15 @@ def multipole(report: Report, sizes: list[int]) -> None:
 
 
 def memory(report: Report, n: int) -> None:
-    task = Cloud(n).ours(1e-3)
-    task()
-    tracemalloc.start()
-    task()
-    report.figures["most memory beyond x and m"] = (tracemalloc.get_traced_memory()[1] / n, "B")
-    tracemalloc.stop()
+    cloud = Cloud(n)
+    for tolerance in (1e-3, 1e-5):
+        task = cloud.ours(tolerance)
+        task()
+        tracemalloc.start()
+        task()
+        label = f"most memory beyond x and m, {tolerance:.0e}"
+        report.figures[label] = (tracemalloc.get_traced_memory()[1] / n, "B a particle")
+        tracemalloc.stop()
 
 
 def pytreegrav_tasks(cloud: Cloud) -> Iterator[tuple[str, Accelerations]]:
@@ -144,11 +147,37 @@ def peers(report: Report, n: int) -> None:
                 report.ratio(name, ours)
 
 
-def first_call() -> float:
+CROSSINGS = [2_000, 4_000, 8_000, 16_000, 32_000]
+
+
+def crossovers(report: Report, sizes: list[int]) -> None:
+    """Seconds of both methods where they are about as fast."""
+    for real in (np.float32, np.float64):
+        for n in sizes:
+            x, m = plummer_sphere(n)
+            points, name = x.astype(real), np.dtype(real).name
+            seconds = best(lambda p=points, w=m: gravity.acceleration(p, w), 3)
+            report.figures[f"{name}, n = {n}, direct"] = (seconds * 1e3, "ms")
+            for tolerance in (1e-3, 1e-5, *([1e-8] if real is np.float64 else [])):
+                law = {"tolerance": tolerance, "method": "multipole"}
+                task = lambda p=points, w=m, k=law: gravity.acceleration(p, w, **k)  # noqa: E731
+                task()
+                label = f"{name}, n = {n}, tolerance {tolerance:.0e}"
+                report.figures[label] = (best(task, 3) * 1e3, "ms")
+
+
+def starts(report: Report, tolerances: list[float]) -> None:
+    for tolerance in tolerances:
+        label = f"first call at {tolerance:.0e}, empty kernel cache"
+        report.figures[label] = (first_call(tolerance), "s")
+
+
+def first_call(tolerance: float) -> float:
     """Seconds of a first call in a new process with an empty kernel cache, without imports."""
     program = (
         "import numpy, time; from motes import gravity; x = numpy.random.rand(20000, 3);"
-        "t = time.time(); gravity.acceleration(x, x[:, 0], tolerance=1e-3, method='multipole');"
+        "t = time.time();"
+        f"gravity.acceleration(x, x[:, 0], tolerance={tolerance}, method='multipole');"
         "print(time.time() - t)"
     )
     with tempfile.TemporaryDirectory() as folder:
@@ -157,15 +186,25 @@ def first_call() -> float:
         return float(subprocess.run(run, env=environment, check=True, capture_output=True).stdout)
 
 
+PARTS: dict[str, Callable[[Report, bool], None]] = {
+    "direct": lambda report, quick: direct(report, 20_000 if quick else 65_536),
+    "multipole": lambda report, quick: multipole(report, [100_000] + [1_000_000] * (not quick)),
+    "large": lambda report, quick: multipole(report, [10_000_000] * (not quick)),
+    "memory": lambda report, quick: memory(report, 100_000 if quick else 1_000_000),
+    "peers": lambda report, quick: peers(report, 20_000 if quick else 100_000),
+    "crossover": lambda report, quick: crossovers(report, [4_000] if quick else CROSSINGS),
+    "start": lambda report, quick: starts(report, [1e-3] if quick else [1e-3, 1e-5, 1e-8]),
+}
+
+
 def main() -> None:
-    options = arguments(__doc__).parse_args()
+    parser = arguments(__doc__)
+    parser.add_argument("--part", choices=PARTS, action="append", help="measure this part only")
+    options = parser.parse_args()
     report = Report("Gravity", machine=machine(("pytreegrav", "fmm3dpy")))
     begun = time.perf_counter()
-    direct(report, 20_000 if options.quick else 65_536)
-    multipole(report, [100_000] if options.quick else [100_000, 1_000_000, 10_000_000])
-    memory(report, 100_000 if options.quick else 1_000_000)
-    peers(report, 20_000 if options.quick else 100_000)
-    report.figures["first call, empty kernel cache"] = (first_call(), "s")
+    for part in options.part or PARTS:
+        PARTS[part](report, options.quick)
     report.notes.append(f"measured in {time.perf_counter() - begun:.0f} s")
     report.print(options.json)
 

@@ -37,7 +37,7 @@ def acceptance(order: int) -> Callable[..., None]:
         neglected = pull * pull * power(q2, order)
         verdict[0] = all_positive(r2 - gap * gap, opening2 * r2 - square, rest2 * rest2 - neglected)
 
-    return is_far  # type: ignore[no-any-return]
+    return is_far
 
 
 def power(value: Any, exponent: int) -> Any:

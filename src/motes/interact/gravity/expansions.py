@@ -129,6 +129,8 @@ def powers(order: int, ratio: Any, one: Any) -> list[Any]:
 
 def products(sums: list[list[tuple[Any, Any]]]) -> list[Any]:
     """Sums of products, some at a time: a processor begins the next sum before one is done."""
+    if (tape := getattr(sums[0][0][0], "tape", None)) is not None:
+        return list(tape.sums(sums))
     found: list[Any] = []
     for first in range(0, len(sums), TOGETHER):
         some = sums[first : first + TOGETHER]

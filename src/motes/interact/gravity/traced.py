@@ -19,7 +19,7 @@ from numba.extending import intrinsic
 
 from motes.interact.gravity import lanes as simd
 from motes.interact.gravity.lanes import LANES
-from motes.interact.gravity.tape import Array, Note, Tape, Total
+from motes.interact.gravity.tape import Array, Note, Tape
 
 
 def traced(formula: Callable[..., None], looped: bool = False) -> Callable[..., None]:
@@ -29,7 +29,8 @@ def traced(formula: Callable[..., None], looped: bool = False) -> Callable[..., 
     numbers. Both may be assigned to. With lanes, a number is that number in each lane.
     """
     if numba.config.DISABLE_JIT:
-        return formula
+        # As in machine code, what overflows or is 0 / 0 is no fault: such cells are not far.
+        return np.errstate(divide="ignore", invalid="ignore", over="ignore")(formula)
 
     def operation(typing: Any, *arguments: Any) -> Any:
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -126,11 +127,14 @@ class _Array:
 
 
 class _Rows(_Array):
+    def _first(self, row: Any) -> Any:
+        return self.builder.mul(_index(row), _index(LANES))
+
     def __getitem__(self, row: int) -> Wire:
-        return self.lanes(_index(row * LANES))
+        return self.lanes(self._first(row))
 
     def __setitem__(self, row: int, lanes: Wire) -> None:
-        pointer = self.pointer(_index(row * LANES), True)
+        pointer = self.pointer(self._first(row), True)
         self.builder.store(lanes.value, pointer, align=self.align)
 
 
@@ -150,20 +154,22 @@ def _wire(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return Wire(builder, value)
 
 
-def _index(k: int) -> Any:
-    return ir.Constant(ir.IntType(64), k)
+def _index(k: Any) -> Any:
+    """A whole number as LLVM's; one of its values stays what it is."""
+    return ir.Constant(ir.IntType(64), k) if isinstance(k, int) else k
 
 
 def _noted(tape: Tape, value: Any) -> Any:
     if isinstance(value, Wire):
-        return tape.given(value)
+        return tape.given(lambda: value)
     return Array(tape, value) if isinstance(value, _Array) else value
 
 
 def inverse_root(lanes: Any) -> Any:
     """1 / root of each lane."""
     if isinstance(lanes, Note):
-        return lanes.tape.given(inverse_root(lanes.straight()))
+        root = inverse_root(lanes.straight())
+        return lanes.tape.given(lambda: root)
     if not isinstance(lanes, Wire):
         return lanes.dtype.type(1) / np.sqrt(lanes)
     one = simd.constant(lanes.value.type.element, 1.0)
@@ -178,6 +184,29 @@ def ones(like: Any) -> Any:
     if not isinstance(like, Wire):
         return np.ones_like(like)
     return Wire(like.builder, simd.constant(like.value.type.element, 1.0))
+
+
+def rows(array: Any, count: int) -> list[Any]:
+    """The first `count` rows of an array, or its numbers."""
+    return array.rows(count) if isinstance(array, Array) else [array[k] for k in range(count)]
+
+
+def write(array: Any, values: list[Any]) -> None:
+    """Write lanes to the first rows of an array."""
+    _write(array, values, lambda lanes: lanes)
+
+
+def write_totals(array: Any, values: list[Any]) -> None:
+    """Write the sums over lanes to the first numbers of an array."""
+    _write(array, values, total)
+
+
+def _write(array: Any, values: list[Any], change: Callable[[Any], Any]) -> None:
+    if isinstance(array, Array):
+        array.write(values, change)
+    else:
+        for k, value in enumerate(values):
+            array[k] = change(value)
 
 
 def all_positive(*values: Any) -> Any:
@@ -195,8 +224,6 @@ def all_positive(*values: Any) -> Any:
 
 def total(lanes: Any) -> Any:
     """Sum over the lanes, a number."""
-    if isinstance(lanes, Note):
-        return Total(lanes, total)
     if not isinstance(lanes, Wire):
         return lanes.sum()
     return Wire(lanes.builder, simd.added(lanes.builder, lanes.value))
@@ -205,16 +232,22 @@ def total(lanes: Any) -> Any:
 def gathered(table: Any, chosen: Any, count: int) -> Sequence[Any]:
     """The first `count` columns of a table, lane k from row chosen[k]; its width fills lanes."""
     if isinstance(table, Array):
-        return [table.tape.given(wire) for wire in gathered(table.array, chosen.array, count)]
+        return table.gathered(chosen, count, PART, gathering)
     if not isinstance(table, _Array):
         return [table[chosen[:LANES], column].copy() for column in range(count)]
-    columns: list[Any] = []
+    part = gathering(table, chosen)
+    return [column for first in range(0, count, PART) for column in part(first)][:count]
+
+
+def gathering(table: Any, chosen: Any) -> Callable[[Any], list[Wire]]:
+    """Function that gathers PART columns of a table, from a given one on."""
     builder, long = table.builder, ir.IntType(64)
     rows = [
         builder.mul(builder.sext(chosen.number(_index(lane)), long), table.width)
         for lane in range(LANES)
     ]
-    for first in range(0, count, PART):
+
+    def columns(first: Any) -> list[Wire]:
         parts = [table.part(builder.add(row, _index(first))) for row in rows]
         # Parts k, k + 4, k + 8 ... end to end; then columns, in each part apart from the others.
         a, b, c, d = (simd.joined(builder, parts[k::PART]) for k in range(PART))
@@ -223,12 +256,13 @@ def gathered(table: Any, chosen: Any, count: int) -> Sequence[Any]:
             _by_parts(builder, *pair, places) for pair in ((a, b), (c, d)) for places in (low, high)
         )
         left, right = (0, 1, LANES, LANES + 1), (2, 3, LANES + 2, LANES + 3)
-        columns += [
+        return [
             Wire(builder, _by_parts(builder, *pair, places))
             for pair in ((ab, cd), (ab_, cd_))
             for places in (left, right)
         ]
-    return columns[:count]
+
+    return columns
 
 
 def _by_parts(builder: Any, a: Any, b: Any, places: tuple[int, ...]) -> Any:
@@ -239,20 +273,24 @@ def _by_parts(builder: Any, a: Any, b: Any, places: tuple[int, ...]) -> Any:
 def scattered(columns: Sequence[Any], table: Any, first: Any) -> None:
     """Write lane k of all columns to row `first` + k of a table, whose width fills lanes."""
     if isinstance(table, Array):
-        table.tape.keep(list(columns), lambda wires: scattered(wires, table.array, first))
+        table.scattered(columns, lambda array, some, begin: scatter(some, array, first, begin))
         return
     if not isinstance(table, _Array):
         for column, values in enumerate(columns):
             table[first : first + LANES, column] = values
         return
+    whole = [*columns, *[columns[-1]] * (-len(columns) % LANES)]
+    for begin in range(0, len(whole), LANES):
+        scatter(whole[begin : begin + LANES], table, first, begin)
+
+
+def scatter(columns: Sequence[Any], table: Any, first: Any, begin: Any) -> None:
+    """Write LANES columns to a table, from column `begin` on."""
     builder = table.builder
-    values = [column.value for column in columns]
-    values += [values[-1]] * (-len(values) % LANES)
-    for begin in range(0, len(values), LANES):
-        for lane, row in enumerate(_transposed(builder, values[begin : begin + LANES])):
-            place = builder.mul(builder.add(first, _index(lane)), table.width)
-            pointer = table.pointer(builder.add(place, _index(begin)), True)
-            builder.store(row, pointer, align=table.align)
+    for lane, row in enumerate(_transposed(builder, [column.value for column in columns])):
+        place = builder.mul(builder.add(first, _index(lane)), table.width)
+        pointer = table.pointer(builder.add(place, _index(begin)), True)
+        builder.store(row, pointer, align=table.align)
 
 
 def _transposed(builder: Any, rows: list[Any]) -> list[Any]:

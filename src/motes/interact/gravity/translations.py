@@ -25,7 +25,17 @@ from motes.interact.gravity.expansions import (
     unfolded,
 )
 from motes.interact.gravity.lanes import LANES
-from motes.interact.gravity.traced import gathered, inverse_root, ones, scattered, total, traced
+from motes.interact.gravity.traced import (
+    gathered,
+    inverse_root,
+    ones,
+    rows,
+    scattered,
+    total,
+    traced,
+    write,
+    write_totals,
+)
 
 STRAIGHT = 64
 """Numbers in the longest expansion whose operations are straight-line code."""
@@ -73,14 +83,12 @@ def translations(order: int, harmonic: bool) -> Translations:
     @operation
     def particles_to_moments(place: Any, sums: Any) -> None:
         found = monomials(order, (place[0], place[1], place[2]), place[3])
-        for row, t in enumerate(every):
-            sums[row] = sums[row] + found[t]
+        write(sums, [old + found[t] for t, old in zip(every, rows(sums, len(every)), strict=True)])
 
     @operation
     def sums_to_moments(sums: Any, moments: Any) -> None:
-        whole = {t: sums[row] for row, t in enumerate(every)}
-        for row, moment in enumerate(folded(kind, whole)):
-            moments[row] = total(moment)
+        whole = dict(zip(every, rows(sums, len(every)), strict=True))
+        write_totals(moments, folded(kind, whole))
 
     @operation
     def moments_to_moments(place: Any, chosen: Any, table: Any, moments: Any) -> None:
@@ -91,8 +99,7 @@ def translations(order: int, harmonic: bool) -> Translations:
         new = products(
             [[(old[c], shift[minus(b, c)]) for c in basis if min(minus(b, c)) >= 0] for b in every]
         )
-        for row, moment in enumerate(folded(kind, dict(zip(every, new, strict=True)))):
-            moments[row] = total(moment)
+        write_totals(moments, folded(kind, dict(zip(every, new, strict=True))))
 
     @operation
     def moments_to_local(
@@ -112,8 +119,8 @@ def translations(order: int, harmonic: bool) -> Translations:
                 for a in basis
             ]
         )
-        for row, (a, value) in enumerate(zip(basis, values, strict=True)):
-            local[row] = local[row] + value * power[sum(a)]
+        old = rows(local, len(basis))
+        write(local, [o + v * power[sum(a)] for o, a, v in zip(old, basis, values, strict=True)])
 
     @traced
     def lanes_to_local(local: Any, terms: Any) -> None:
@@ -122,7 +129,7 @@ def translations(order: int, harmonic: bool) -> Translations:
 
     @operation
     def local_to_local(place: Any, terms: Any, table: Any, first: Any) -> None:
-        whole = unfolded(kind, [terms[row] for row in range(len(basis))])
+        whole = unfolded(kind, rows(terms, len(basis)))
         shift = monomials(order, (place[0], place[1], place[2]), ones(place[0]))
         power = powers(order, place[4], ones(place[4]))
         new = products(
@@ -135,7 +142,7 @@ def translations(order: int, harmonic: bool) -> Translations:
 
     @operation
     def local_to_particles(place: Any, terms: Any, scale: Any, out: Any) -> None:
-        whole = unfolded(kind, [terms[row] for row in range(len(basis))])
+        whole = unfolded(kind, rows(terms, len(basis)))
         shift = monomials(order, (place[0], place[1], place[2]), ones(place[0]))
         inner = [t for t in every if sum(t) < order]
         sums = [[(whole[plus(t, unit)], shift[t]) for t in inner] for unit in UNITS]

@@ -30,6 +30,9 @@ only, and expansions around its center hardly converge at its edge.
 FINER = 1
 """Levels from a usual leaf up to one that is much larger."""
 
+TASKS = 64
+"""Parts of the upward pass."""
+
 NOTHING = (8.0, 8.0, 8.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 """A ball without mass, outside of the box: what lanes that are left over are about."""
 
@@ -49,7 +52,8 @@ class Tree(NamedTuple):
     bodies: NDArray[np.float64]
     """(cells, 5) center of mass, distance of the particle farthest from it, mass."""
     balls: NDArray[Any]
-    """(cells + 1, 8) the same as the walk tests many of: `ball`, and a last row that is NOTHING."""
+    """(cells + LANES, 8) the same as the walk tests many: the center in two parts that sum to it,
+    radius and mass; the last rows are NOTHING."""
     order: NDArray[np.uint32]
     """(n,) row of each particle in the arrays that it came from."""
     place: NDArray[np.float64]
@@ -202,9 +206,9 @@ def _approach(tree: Tree, cell: Any, relative: bool) -> None:
 
 @cache
 def _summation(order: int, harmonic: bool) -> Callable[..., None]:
-    """Compiled function that fills in bodies, near and moments of cells `first` to `last`.
+    """Compiled function that fills in bodies, near and moments of cells in ranges (k, 2).
 
-    (tree, first, last, relative, place, chosen, sums) -> None
+    (tree, ranges, relative, place, chosen, sums) -> None; the last cell of a range is the first.
     """
     operations = translations(order, harmonic)
     particles_to_moments = operations.particles_to_moments
@@ -247,22 +251,22 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
         moments_to_moments(place, chosen, tree.moments, tree.moments[cell])
 
     @jit
-    def fill(
-        tree: Tree, first: Any, last: Any, relative: bool, place: Any, chosen: Any, sums: Any
-    ) -> None:
-        for back in range(last - first):
-            cell = last - 1 - back
-            is_leaf = tree.cells[cell, NUMBER] == 0
-            _measure(tree, cell)
-            if is_leaf:
-                _approach(tree, cell, relative)
-            if tree.moments.shape[0] > 0:
+    def fill(tree: Tree, ranges: Any, relative: bool, place: Any, chosen: Any, sums: Any) -> None:
+        for some in range(ranges.shape[0]):
+            first, last = ranges[some, 0], ranges[some, 1]
+            for back in range(last - first):
+                cell = last - 1 - back
+                is_leaf = tree.cells[cell, NUMBER] == 0
+                _measure(tree, cell)
                 if is_leaf:
-                    moments_of_leaf(tree, cell, place, sums)
-                else:
-                    moments_of_parent(tree, cell, place, chosen)
-                # Single precision would lose digits of the sum of many equal masses.
-                tree.moments[cell, 0] = tree.bodies[cell, MASS]
+                    _approach(tree, cell, relative)
+                if tree.moments.shape[0] > 0:
+                    if is_leaf:
+                        moments_of_leaf(tree, cell, place, sums)
+                    else:
+                        moments_of_parent(tree, cell, place, chosen)
+                    # Single precision would lose digits of the sum of many equal masses.
+                    tree.moments[cell, 0] = tree.bodies[cell, MASS]
 
     return fill  # type: ignore[no-any-return]
 
@@ -330,23 +334,25 @@ def summarize(tree: Tree, order: int, harmonic: bool, real: type, sources: bool)
     count = len(tree.cells) + 1 if sources else 0
     near: NDArray[Any] = np.empty((4, tree.place.shape[1] + LANES), real)
     near[:, -LANES:] = 0
-    balls: NDArray[Any] = np.empty((len(tree.cells) + 1, 8), real)
-    balls[-1] = NOTHING
+    balls: NDArray[Any] = np.empty((len(tree.cells) + LANES, 8), real)
+    balls[-LANES:] = NOTHING
     moments: NDArray[Any] = np.zeros((count, padded(operations.basis)), real)
     tree = tree._replace(moments=moments, near=near, balls=balls)
 
-    def cells(first: int, last: int) -> None:
+    def cells(ranges: list[tuple[int, int]]) -> None:
         place: NDArray[Any] = np.ones((5, LANES), real)
         sums: NDArray[Any] = np.empty((operations.every, LANES), real)
-        fill(tree, first, last, real is np.float32, place, np.zeros(LANES, np.int32), sums)
+        chosen = np.zeros(LANES, np.int32)
+        fill(tree, np.array(ranges).reshape(-1, 2), real is np.float32, place, chosen, sums)
+
+    tasks = np.array_split(branches, min(len(branches), TASKS))
+    ends = {cell: (int(tree.cells[cell, FIRST]), _end(tree, cell)) for cell in branches}
 
     def branch(k: int) -> None:
-        cells(int(tree.cells[branches[k], FIRST]), _end(tree, branches[k]))
-        cells(branches[k], branches[k] + 1)
+        cells([r for cell in tasks[k] for r in (ends[int(cell)], (int(cell), int(cell) + 1))])
 
-    share(branch, len(branches))
-    for cell in reversed(stem):
-        cells(cell, cell + 1)
+    share(branch, len(tasks))
+    cells([(cell, cell + 1) for cell in reversed(stem)])
     return tree
 
 

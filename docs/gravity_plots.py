@@ -1,0 +1,150 @@
+"""Plot the cells and the cost of gravity to docs/pictures: python3 docs/gravity_plots.py [NAME].
+
+`gravity_cells`: what one target meets; `gravity_cost`: seconds over n. Needs matplotlib; takes
+about a minute.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.collections import PatchCollection
+from matplotlib.patches import Rectangle
+
+from motes import gravity
+from motes.interact.gravity.multipole import Plan, Problem
+from motes.interact.gravity.tree import END, FIRST, MASS, NUMBER, RADIUS, START, Box, Tree
+
+FOLDER = Path(__file__).resolve().parent / "pictures"
+ORDER, LEAF, ALLOWED = 5, 24, 2e-3
+NIGHT, INK = "#0b0e17", "#e8e6df"
+
+
+def disc(n: int) -> Any:
+    """A thin exponential disc with two arms."""
+    rng = np.random.default_rng(4)
+    r = rng.gamma(2.6, 0.95, n)
+    arm = np.pi * rng.integers(0, 2, n) + 1.6 * np.log(0.4 + r) + 0.28 * rng.normal(size=n)
+    angle = np.where(rng.random(n) < 0.75, arm, rng.uniform(0, 2 * np.pi, n))
+    x = np.stack([r * np.cos(angle), r * np.sin(angle), 0.03 * rng.normal(size=n)], axis=1)
+    return x[r < 6.5]
+
+
+def met(tree: Tree, leaf: int) -> tuple[list[int], list[int]]:
+    """Cells whose expansions the leaf's target cells use, and leaves that it sums by pairs."""
+    far: list[int] = []
+    candidates, target = [0], 0
+    while True:
+        near: list[int] = []
+        x, _, radius, _ = parts(tree, target)
+        inner = tree.cells[target, NUMBER] > 0
+        while candidates:
+            cell = candidates.pop()
+            y, mass, reach, children = parts(tree, cell)
+            r2 = float(((x - y) ** 2).sum())
+            q2 = (radius + reach) ** 2 / r2 if r2 else np.inf
+            if q2 < 1 and mass / r2 * q2 ** (ORDER / 2) / (1 - q2) ** 2 < ALLOWED:
+                far.append(cell)
+            elif children and not (inner and reach < radius):
+                candidates += children
+            else:
+                near.append(cell)
+        if not inner:
+            return far, near
+        start = tree.cells[leaf, START]
+        target = next(c for c in parts(tree, target)[3] if tree.cells[c, END] > start)
+        candidates = near
+
+
+def parts(tree: Tree, cell: int) -> tuple[Any, float, float, list[int]]:
+    """Center, mass, radius and children of a cell."""
+    body, first = tree.bodies[cell], int(tree.cells[cell, FIRST])
+    children = list(range(first, first + int(tree.cells[cell, NUMBER])))
+    return body[:3], float(body[MASS]), float(body[RADIUS]), children
+
+
+def cells() -> None:
+    """What one target meets: the farther, the more particles in one cell."""
+    x = disc(24_000)
+    box = Box(x.min(axis=0), float(np.ptp(x, axis=0).max()), 1.0)
+    plan = Plan(order=ORDER, leaf=LEAF, real=np.float64)
+    mass = np.full(len(x), 1 / len(x))
+    tree = Problem.build(x, mass, None, box, "newton", 0.0, False, plan).sources
+    leaves = np.flatnonzero(tree.cells[:, NUMBER] == 0)
+    here = np.array([2.1, 1.4, 0.0]) - box.low
+    leaf = int(leaves[np.argmin(((tree.bodies[leaves, :3] - here) ** 2).sum(axis=1))])
+    far, near = met(tree, leaf)
+    patches, counts = [], []
+    for cell in far + near:
+        start, end = tree.cells[cell, :2]
+        low, high = (f(tree.place[:2, start:end], axis=1) for f in (np.min, np.max))
+        patches.append(Rectangle(low, *(high - low)))
+        counts.append(end - start)
+    figure, axes = plt.subplots(figsize=(9, 9), facecolor=NIGHT, layout="constrained")
+    axes.scatter(*tree.place[:2], s=1.1, c=INK, alpha=0.7, linewidths=0)
+    shown = PatchCollection(patches[: len(far)], cmap="turbo", alpha=0.34, edgecolor="none")
+    shown.set_array(np.log2(counts[: len(far)]))
+    axes.add_collection(shown)
+    tint = shown.to_rgba(np.log2(counts[: len(far)]))
+    axes.add_collection(PatchCollection(patches[: len(far)], facecolor="none", edgecolor=tint))
+    axes.add_collection(PatchCollection(patches[len(far) :], facecolor="none", edgecolor="white"))
+    axes.plot(*tree.bodies[leaf, :2], "*", color="white", markersize=15)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    whole = matplotlib.cm.ScalarMappable(shown.norm, shown.cmap)
+    bar = figure.colorbar(whole, ax=axes, orientation="horizontal", fraction=0.035, pad=0.01)
+    bar.set_label("particles in a cell, of which the star feels one expansion", color=INK)
+    ticks = np.arange(2, np.log2(max(counts)), 2)
+    bar.set_ticks(list(ticks), labels=[f"{2 ** int(k)}" for k in ticks])
+    bar.ax.tick_params(colors=INK)
+    figure.savefig(FOLDER / "gravity_cells.png", dpi=90)
+
+
+def cost() -> None:
+    """Seconds over n: all pairs, and expansions at two tolerances."""
+    figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
+    kinds: dict[str, tuple[float | None, list[int]]] = {
+        "all pairs, single precision": (None, [1_000, 3_000, 10_000, 30_000, 100_000]),
+        "tolerance 1e-3": (1e-3, [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000]),
+        "tolerance 1e-5": (1e-5, [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000]),
+    }
+    for label, (tolerance, sizes) in kinds.items():
+        rows = []
+        for n in sizes:
+            x = np.random.default_rng(0).normal(size=(n, 3)).astype(np.float32)
+            m = np.full(n, 1 / n)
+            method = "direct" if tolerance is None else "multipole"
+            rows.append((n, seconds(x, m, tolerance, method)))
+        axes.loglog(*np.transpose(rows), "o-", label=label)
+        slope = 2 if tolerance is None else 1
+        n, last = rows[-1]
+        axes.plot(sizes, [last * (k / n) ** slope for k in sizes], "k:", linewidth=0.8)
+    axes.set(xlabel="particles", ylabel="seconds (dotted: n² and n)")
+    axes.legend()
+    axes.grid(alpha=0.2)
+    figure.savefig(FOLDER / "gravity_cost.png", dpi=90)
+
+
+def seconds(x: Any, m: Any, tolerance: float | None, method: str) -> float:
+    """The shorter of two runs, after one that compiles."""
+    times = []
+    for _ in range(3):
+        begun = time.perf_counter()
+        gravity.acceleration(x, m, tolerance=tolerance, method=method)
+        times.append(time.perf_counter() - begun)
+    return min(times[1:])
+
+
+if __name__ == "__main__":
+    FOLDER.mkdir(exist_ok=True)
+    plots = {"gravity_cells": cells, "gravity_cost": cost}
+    for name in sys.argv[1:] or plots:
+        plots[name]()
