@@ -40,6 +40,7 @@ class Simulation:
     frame_count = 12
     breaks_at: int | None = None
     error: type[BaseException] = KeyboardInterrupt
+    captures: tuple[()] = ()
 
     def __init__(self, scene: Scene) -> None:
         self.work = 0
