@@ -343,7 +343,9 @@ def summarize(tree: Tree, order: int, harmonic: bool, real: type, sources: bool)
         place: NDArray[Any] = np.ones((5, LANES), real)
         sums: NDArray[Any] = np.empty((operations.every, LANES), real)
         chosen = np.zeros(LANES, np.int32)
-        fill(tree, np.array(ranges, np.int64).reshape(-1, 2), real is np.float32, place, chosen, sums)
+        fill(
+            tree, np.array(ranges, np.int64).reshape(-1, 2), real is np.float32, place, chosen, sums
+        )
 
     tasks = np.array_split(branches, min(len(branches), TASKS))
     ends = {cell: (int(tree.cells[cell, FIRST]), _end(tree, cell)) for cell in branches}
