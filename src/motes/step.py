@@ -30,9 +30,6 @@ SMALLEST_BLOCK = 1 << 14
 MANY = 2048
 """Newborns in a step from which a SIMD kernel of their own is worth its compilation."""
 
-WORD = 8
-"""Flags that are looked at together."""
-
 NOTHING: NDArray[np.int64] = np.zeros(0, np.int64)
 """No rows."""
 
@@ -177,8 +174,8 @@ class Stepper:
         """A kernel with the arrays that it works on, which are the same from step to step until
         there are more rows than they hold."""
         arrays = (
-            rows.position, rows.velocity, rows.birth, rows.columns, self._flags(rows),
-            self.held, self.system.K,
+            rows.position, rows.velocity, rows.birth, rows.columns, *self._marks(rows),
+            self.system.K,
         )  # fmt: skip
         known = self._steps.get(kernel)
         if known is None or not all(map(operator.is_, arrays, known[0])):
@@ -209,14 +206,14 @@ class Stepper:
         """
         if self.system.surfaces is None:
             return False
-        threats, flags, parts = self.system.staged("threats"), self._flags(rows), _parts(alive, 1)
+        threats, parts, marks = self.system.staged("threats"), _parts(alive, 1), self._marks(rows)
         held = [NOTHING] * len(parts)
 
         def threaten(k: int) -> None:
             low, high = parts[k]
             count = threats(
-                rows.position, rows.velocity, flags, self.held, self.system.K_staged, ends,
-                interval.begin, interval.end, low, high,
+                rows.position, rows.velocity, *marks, self.system.K_staged, ends, interval.begin,
+                interval.end, low, high,
             )  # fmt: skip
             held[k] = self.held[low : low + count]
 
@@ -252,7 +249,7 @@ class Stepper:
         mortal = self.system.motion.mortal
         if not rows.count or not (mortal or caught.size):
             return
-        flags, parts = self._flags(rows), _parts(exceptional.size if mortal else 0, 1)
+        (flags, _), parts = self._marks(rows), _parts(exceptional.size if mortal else 0, 1)
         if not mortal:
             flags[: rows.count] = 0
 
@@ -267,12 +264,13 @@ class Stepper:
         flags[caught] = 1
         rows.keep(flags)
 
-    def _flags(self, rows: Particles) -> NDArray[np.uint8]:
-        if self.flags.size < rows.capacity + WORD:
-            self.flags = np.zeros(rows.capacity + WORD, np.uint8)
+    def _marks(self, rows: Particles) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        """Room for a flag of every row, and for a list of those that may meet a solid."""
+        if self.flags.size < rows.capacity:
+            self.flags = np.zeros(rows.capacity, np.uint8)
             if self.system.surfaces is not None:
                 self.held = np.empty(rows.capacity, np.int64)
-        return self.flags
+        return self.flags, self.held
 
 
 def _parts(rows: int, cost: int) -> list[tuple[int, int]]:

@@ -15,9 +15,9 @@ def acceptance(order: int) -> Callable[..., None]:
 
     (balls, chosen, own, stricter, opening2, reach, e2, verdict): row 0 of `verdict` becomes 1 where
     the rows `chosen` of `balls` are far from the ball `own`, and 0 elsewhere. The error of the
-    acceleration must be below `allowed`; it is about M / R^2 q^p / (1 - q^2)^2 with
-    q = (r_A + r_B) / R, the sum of the terms that are left out. q^2 is below `opening2`, the balls
-    are more than `reach` apart, and e2 is added to R^2.
+    acceleration is about M / R^2 q^p / (1 - q^2)^2 with q = (r_A + r_B) / R, the sum of the terms
+    that are left out; `stricter` is one over the error that is allowed. q^2 is below `opening2`,
+    the balls are more than `reach` apart, and e2 is added to R^2.
     """
 
     @traced
