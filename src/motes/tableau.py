@@ -326,11 +326,8 @@ class BackwardDifference:
             _check("", self.order, m, self.a, powers, float(m == 1))
 
 
-Method = Explicit | Splitting | Implicit
-"""Tables that scenes can be compiled with; of implicit ones, those solved stage by stage."""
-
-Table = Method | Rosenbrock | Nystrom | BackwardDifference
-"""All tables, for `motes.ode`."""
+Table = Explicit | Splitting | Implicit | Rosenbrock | Nystrom | BackwardDifference
+"""A method of any family."""
 
 
 def composed(order: int, weights: Sequence[float]) -> Splitting:

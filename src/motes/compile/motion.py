@@ -8,13 +8,15 @@ from itertools import pairwise
 
 import numpy as np
 
+from motes import integrate
 from motes.catalog import Component
-from motes.compile import implicit
+from motes.catalog.source import fields_read
+from motes.compile import implicit, linearised
 from motes.compile.surfaces import write_surfaces
 from motes.compile.text import AXES, STATE, Call, Text, packed
 from motes.control.control import Control
 from motes.errors import SceneError
-from motes.tableau import Explicit, Implicit, Method, Splitting
+from motes.tableau import BackwardDifference, Explicit, Implicit, Nystrom, Rosenbrock, Splitting, Table
 
 PARTICLE = {"age": "age", "id": "id", "obstacle": "obstacle"}
 """Columns of `q` that the engine computes itself."""
@@ -50,7 +52,7 @@ class Motion:
     retire: tuple[tuple[str, Component], ...]
     traits: dict[str, tuple[str, Control]]
     """Values of the system by name (life, mass, size, color): address and control."""
-    method: Method
+    method: Table
     solids: tuple[tuple[str, Component], ...] = ()
     """The scene's solids, for forces that need to see obstacles."""
 
@@ -63,6 +65,30 @@ class Motion:
     def inertial(self) -> bool:
         """Whether particles have a velocity of their own: all but those that flows alone carry."""
         return bool(self.forces) or not self.flows
+
+    @property
+    def split(self) -> bool:
+        """Whether the method takes forces that are declared stiff implicitly, others explicitly."""
+        pair = isinstance(self.method, Implicit) and bool(self.method.a_explicit)
+        return pair and any(_stiff(c) for _, c in self.forces)
+
+    @property
+    def remembers(self) -> int:
+        """Numbers that a particle keeps from step to step, for the method's sake."""
+        return 7 if isinstance(self.method, BackwardDifference) else 0
+
+    @property
+    def follows_velocity(self) -> str:
+        """Address of something because of which x'' depends on the velocity, or nothing."""
+        for address, c in (*self.flows, *self.forces):
+            if c.kernel("acceleration") is None:  # A flow, a relaxation, a limit.
+                return address
+            if set(STATE[3:]) & fields_read(c.kernel("acceleration"), 1, STATE):
+                return address
+            by_speed = [k for k, v in c.values.items() if getattr(v, "over", "") == "speed"]
+            if by_speed:
+                return f"{address}.{by_speed[0]}"
+        return ""
 
     @property
     def relaxes(self) -> bool:
@@ -86,14 +112,16 @@ def write_motion(text: Text, motion: Motion) -> None:
     `advance(x, ..., age, C, S_0, ..., L, t_0, ..., h)` takes one particle through a step of length
     h; S_i and t_i are the scene's values and the time at the method's i-th stage.
     """
-    writer = _Writer(text, motion)
+    writer, method = _Writer(text, motion), motion.method
     writer.right_hand_side()
-    if isinstance(motion.method, Explicit):
-        writer.explicit(motion.method)
-    elif isinstance(motion.method, Implicit):
-        writer.implicit(motion.method)
+    if isinstance(method, Explicit):
+        writer.explicit(method)
+    elif isinstance(method, Nystrom):
+        writer.nystrom(method)
+    elif isinstance(method, Splitting):
+        writer.splitting(method)
     else:
-        writer.splitting(motion.method)
+        writer.implicit(method)
     if motion.mortal:
         writer.dies()
 
@@ -105,12 +133,16 @@ def write_potential(text: Text, motion: Motion) -> None:
     writer.potential()
 
 
-def stage_times(method: Method) -> tuple[float, ...]:
+def stage_times(method: Table) -> tuple[float, ...]:
     """Times at which the scene's values are needed, as shares of the step."""
-    if isinstance(method, Explicit):
+    if isinstance(method, Explicit | Nystrom):
         return method.c
     if isinstance(method, Implicit):
         return tuple(method.c[i] for i in implicit.stages(method))
+    if isinstance(method, Rosenbrock):
+        return linearised.rosenbrock_times(method)
+    if isinstance(method, BackwardDifference):
+        return (1.0,)
     kicks = method.times
     middles = [(a + b) / 2 for a, b in pairwise(kicks)]
     return tuple(sorted({*kicks, *middles}))
@@ -181,13 +213,10 @@ class _Writer:
             self.text.add(SEEN if self.motion.solids else NOTHING_SEEN)
         arguments = ", ".join(STATE)
         calls = [self._call(address, c, "velocity") for address, c in self.motion.flows]
-        direct: list[Call] = []
-        relaxing: list[Call] = []
-        for address, c in self.motion.forces:
-            for name, found in (("acceleration", direct), ("relaxation", relaxing)):
-                if c.kernel(name) is not None:
-                    found.append(self._call(address, c, name))
-                    break
+        split, parts = self.motion.split, dict[str, str]()
+        for name in ("pushed", "mild") if split else ("pushed",):
+            wanted = [f for f in self.motion.forces if not split or _stiff(f[1]) == (name == "pushed")]
+            parts[name] = self._pushed(wanted)
         if "life" in self.text.values.over:
             self._life()
         head = f"({arguments}, age, C, S, L, t):\n{self._preamble()}"
@@ -196,6 +225,20 @@ class _Writer:
             + self._sum(calls, ("ux", "uy", "uz"))
             + "    return ux, uy, uz\n"
         )
+        for name, body in parts.items():
+            self.text.add(f"@inline\ndef {name}{head}{body}    return ax, ay, az, k, bx, by, bz\n")
+        if self.motion.limits:
+            self._limits(arguments)
+
+    def _pushed(self, forces: Sequence[tuple[str, Component]]) -> str:
+        """Source that adds up forces: an acceleration, and all relaxations as k v against b."""
+        direct: list[Call] = []
+        relaxing: list[Call] = []
+        for address, c in forces:
+            for name, found in (("acceleration", direct), ("relaxation", relaxing)):
+                if c.kernel(name) is not None:
+                    found.append(self._call(address, c, name))
+                    break
         body = self._sum(direct, ("ax", "ay", "az"))
         body += "    k = F(0.0)\n    bx = F(0.0)\n    by = F(0.0)\n    bz = F(0.0)\n"
         for call in relaxing:
@@ -205,9 +248,7 @@ class _Writer:
                 for i, axis in enumerate(AXES, 1)
                 if not call.always_zero(i)
             )
-        self.text.add(f"@inline\ndef pushed{head}{body}    return ax, ay, az, k, bx, by, bz\n")
-        if self.motion.limits:
-            self._limits(arguments)
+        return body
 
     def _limits(self, arguments: str) -> None:
         """`limited`: what the body can do of a sum of accelerations."""
@@ -285,14 +326,53 @@ class _Writer:
             lines += self._slopes(i, names, method.c[i])
         self._advance(method, lines, stages[-1])
 
-    def implicit(self, method: Implicit) -> None:
-        """`advance` with Newton's method for each stage."""
+    def nystrom(self, method: Nystrom) -> None:
+        """`advance` for accelerations that follow from place and time alone."""
+        if guilty := self.motion.follows_velocity:
+            raise SceneError(
+                "nystrom5 is for forces that follow from place and time alone, and "
+                f"{guilty} depends on the velocity. Choose rk4 or dopri5."
+            )
+        lines = "    h2 = h * h\n"
+        for i, (c, row) in enumerate(zip(method.c, method.a, strict=True)):
+            moved = [f"{a} + F({float(c)!r}) * h * v{a}" if c else a for a in AXES]
+            state = [_sum(s, row, "h2", a) for s, a in zip(moved, AXES, strict=True)]
+            names = tuple(f"{a}_{i}" for a in AXES)
+            lines += "".join(f"    {n} = {e}\n" for n, e in zip(names, state, strict=True))
+            lines += self._slopes(i, (*names, *STATE[3:]), float(c))
+        ends = [_sum(f"{a} + h * v{a}", method.b_position, "h2", a) for a in AXES]
+        self._advance(method, lines, ends + [_sum(f"v{a}", method.b, "h", a) for a in AXES])
+
+    def implicit(self, method: Implicit | Rosenbrock | BackwardDifference) -> None:
+        """`advance` with Newton's method for each stage, or for all together."""
         if not self.motion.inertial:
             raise SceneError(
                 "an implicit integrator is for forces; give a system that flows alone carry another"
             )
-        self.text.add(implicit.settle_text(self.text.precision))
-        self._advance(method, *implicit.advance_lines(method))
+        precision, split = self.text.precision, self.motion.split
+        if split and self.motion.limits:
+            raise SceneError(
+                "a limit bounds the sum of all forces: where it acts, none of them can be stiff alone"
+            )
+        self.text.add(implicit.felt_text(self.motion.limits))
+        if split:
+            self.text.add(implicit.felt_text(False, "eased", "mild"))
+        if isinstance(method, Rosenbrock):
+            self.text.add(linearised.rosenbrock_text(precision))
+            self._advance(method, *linearised.rosenbrock_lines(method))
+        elif isinstance(method, Implicit) and not method.diagonal:
+            self.text.add(linearised.together_text(method, precision))
+            self._advance(method, *linearised.together_lines(method))
+        else:
+            self.text.add(implicit.settle_text(precision))
+            start = method if isinstance(method, Implicit) else integrate.method("backward_euler")
+            assert isinstance(start, Implicit)
+            self._advance(method, *implicit.advance_lines(start, split))
+        if isinstance(method, BackwardDifference):
+            past = ", ".join(f"p{k}" for k in range(self.motion.remembers))
+            lines, ends = implicit.proceed_lines()
+            head = f"({', '.join(STATE)}, {past}, age, C, S0, L, t0, h)"
+            self.text.add(f"@inline\ndef proceed{head}:\n{lines}    return {', '.join(ends)}\n")
 
     def splitting(self, method: Splitting) -> None:
         """`advance` as kicks and drifts; relaxations are exact, so that no step explodes."""
@@ -333,7 +413,7 @@ class _Writer:
         lines += f"C, S{middle}, L, t{middle})\n"
         return lines + "".join(f"    {a} += d * ({own[a]}u{a})\n" for a in AXES)
 
-    def _advance(self, method: Method, lines: str, ends: list[str]) -> None:
+    def _advance(self, method: Table, lines: str, ends: list[str]) -> None:
         stages = range(len(stage_times(method)))
         scene = ", ".join(f"S{i}" for i in stages)
         times = ", ".join(f"t{i}" for i in stages)
@@ -358,6 +438,11 @@ class _Writer:
             f"@inline\ndef dies({', '.join(STATE)}, age, C, S, L, t):\n{self._preamble()}"
             f"    return {' | '.join(f'({c})' for c in calls)}\n"
         )
+
+
+def _stiff(force: Component) -> bool:
+    """Whether a force is declared stiff."""
+    return bool(force.values["stiff"].document())
 
 
 def _sum(start: str, weights: Sequence[float], scale: str, axis: str) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from motes.errors import MissingExtra
-from motes.integrate import table as find
+from motes.integrate import method as find
 from motes.jit import jit
 from motes.ode.arithmetic import Array
 from motes.ode.right_hand_side import FirstOrder
