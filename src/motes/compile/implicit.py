@@ -148,14 +148,21 @@ def advance_lines(method: Implicit, split: bool = False) -> tuple[str, list[str]
     return lines, ends
 
 
-def proceed_lines() -> tuple[str, list[str]]:
-    """Source of a step of the second backward difference formula, and its ends.
+PAST = """
+@inline
+def weights_of_past(h, inverse):
+    w = h * inverse
+    whole = F(1.0) + F(2.0) * w
+    return w * w / whole, h * (F(1.0) + w) / whole
+"""
+"""The second backward difference formula is y1 = y0 + c (y0 - y_before) + g f(y1). A row remembers
+its last change, and the inverse length of that step, 0 where it has no past: then the ratio w of
+the steps is 0, and the step is backward Euler's."""
 
-    A row remembers its last change p0 ... p5 and the inverse length p6 of that step, 0 where it has
-    no past: then w = h p6, the ratio of the steps, is 0, and the step is backward Euler's.
-    """
-    lines = "    w = h * p6\n    c = w * w / (F(1.0) + F(2.0) * w)\n"
-    lines += "    g = h * (F(1.0) + w) / (F(1.0) + F(2.0) * w)\n"
+
+def proceed_lines() -> tuple[str, list[str]]:
+    """Source of a step of that formula, with the past p0 ... p6, and its ends."""
+    lines = "    c, g = weights_of_past(h, p6)\n"
     base = ", ".join(f"{n} + c * p{k}" for k, n in enumerate(STATE))
     lines += f"    {', '.join(f'e{n}' for n in STATE)} = settle({base}, {QUIET}, g, age + h, C, S0, L, t0)\n"
     return lines, [f"e{n}" for n in STATE]

@@ -69,6 +69,19 @@ RESIDUALS
 G holds a further acceleration for each stage. Sizes are in m/s."""
 
 
+SHIFTED = """
+
+@inline
+def shifted(x, y, z, vx, vy, vz, M, pivots, h, age, C, S, L, t):
+    linearise(x, y, z, vx, vy, vz, F(0.0), F(0.0), F(0.0), M, age, C, S, L, t)
+    for i in range(36):
+        M[i] = -M[i]
+    for i in range(6):
+        M[7 * i] += F(INVERSE) / h
+    factorise(M, pivots)
+"""
+
+
 def together_text(method: Implicit, precision: str) -> str:
     """`rate`, `linearise` and `together` for a method whose stages belong together."""
     needed = stages(method)
@@ -129,10 +142,7 @@ def rosenbrock_lines(method: Rosenbrock) -> tuple[str, list[str]]:
         return f"rate({state}, {QUIET}, {when})"
 
     lines = "    M, pivots, r = empty(36, F), empty(6, F), empty(6, F)\n"
-    lines += f"    linearise({start}, {QUIET}, M, age, C, S0, L, t0)\n"
-    lines += "    for i in range(36):\n        M[i] = -M[i]\n"
-    lines += f"    for i in range(6):\n        M[7 * i] += F({1 / method.gamma!r}) / h\n"
-    lines += "    factorise(M, pivots)\n"
+    lines += f"    shifted({start}, M, pivots, h, age, C, S0, L, t0)\n"
     slopes = [f"f{n}" for n in STATE]
     lines += f"    {', '.join(slopes)} = {rated(start, 0.0, 0)}\n"
     for number, (share, weight) in enumerate(zip(DRIFT_TIMES, DRIFT, strict=True)):
@@ -154,9 +164,9 @@ def rosenbrock_lines(method: Rosenbrock) -> tuple[str, list[str]]:
     return lines, [_added(n, method.b, n) for n in STATE]
 
 
-def rosenbrock_text(precision: str) -> str:
-    """`rate` and `linearise`."""
-    return _linearise_text(precision)
+def rosenbrock_text(method: Rosenbrock, precision: str) -> str:
+    """`rate`, `linearise` and `shifted`, the factors of 1 / (gamma h) - dF/dY."""
+    return _linearise_text(precision) + SHIFTED.replace("INVERSE", repr(1 / method.gamma))
 
 
 def _linearise_text(precision: str) -> str:

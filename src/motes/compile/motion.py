@@ -358,7 +358,7 @@ class _Writer:
         if split:
             self.text.add(implicit.felt_text(False, "eased", "mild"))
         if isinstance(method, Rosenbrock):
-            self.text.add(linearised.rosenbrock_text(precision))
+            self.text.add(linearised.rosenbrock_text(method, precision))
             self._advance(method, *linearised.rosenbrock_lines(method))
         elif isinstance(method, Implicit) and not method.diagonal:
             self.text.add(linearised.together_text(method, precision))
@@ -369,6 +369,7 @@ class _Writer:
             assert isinstance(start, Implicit)
             self._advance(method, *implicit.advance_lines(start, split))
         if isinstance(method, BackwardDifference):
+            self.text.add(implicit.PAST)
             past = ", ".join(f"p{k}" for k in range(self.motion.remembers))
             lines, ends = implicit.proceed_lines()
             head = f"({', '.join(STATE)}, {past}, age, C, S0, L, t0, h)"
