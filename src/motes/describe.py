@@ -7,10 +7,10 @@ import inspect
 from dataclasses import dataclass
 from typing import Any
 
+from motes import integrate
 from motes.catalog import KINDS, Component, catalog, find, kinds
 from motes.catalog.parameter import Parameter
 from motes.errors import SceneError, likely
-from motes import integrate
 
 DOCUMENT = "document"
 """Kind of the tables that a scene itself has."""

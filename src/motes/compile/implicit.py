@@ -1,7 +1,7 @@
 """Implicit methods for particles: Newton's method for the velocity of one stage of one particle.
 
-A stage is X = p + g (V + u(X)), V = q + g A(X, V), with p and q known and g its own share of
-the step. X is put into the second equation, which leaves three unknowns; their matrix
+A stage is X = p + g V, V = q + g A(X, V), with p and q known and g its own share of the step. X is
+put into the second equation, which leaves three unknowns; their matrix
 1 - g dA/dV - g^2 dA/dX comes from differences at the stage's start. Rows are solved one by one, as
 far as each needs.
 """
@@ -32,8 +32,7 @@ SETTLE = """
 @inline
 def settle(px, py, pz, qx, qy, qz, gx, gy, gz, g, age, C, S, L, t):
     vx, vy, vz = qx, qy, qz
-    ux, uy, uz = carried(px, py, pz, vx, vy, vz, age, C, S, L, t)
-    x, y, z = px + g * (vx + ux), py + g * (vy + uy), pz + g * (vz + uz)
+    x, y, z = px + g * vx, py + g * vy, pz + g * vz
     ax, ay, az = felt(x, y, z, vx, vy, vz, gx, gy, gz, age, C, S, L, t)
     d = F(ROOT) * (F(1.0) + abs(x) + abs(y) + abs(z))
     w = F(ROOT) * (F(1.0) + abs(vx) + abs(vy) + abs(vz))
@@ -66,10 +65,8 @@ def settle(px, py, pz, qx, qy, qz, gx, gy, gz, g, age, C, S, L, t):
         vx += dx
         vy += dy
         vz += dz
-        wx, wy, wz = carried(x, y, z, vx, vy, vz, age, C, S, L, t)
-        size = abs(dx) + abs(dy) + abs(dz) + abs(wx - ux) + abs(wy - uy) + abs(wz - uz)
-        ux, uy, uz = wx, wy, wz
-        x, y, z = px + g * (vx + ux), py + g * (vy + uy), pz + g * (vz + uz)
+        size = abs(dx) + abs(dy) + abs(dz)
+        x, y, z = px + g * vx, py + g * vy, pz + g * vz
         if size <= F(NEAR) * (abs(vx) + abs(vy) + abs(vz)) or not size < last:
             break
         last = size
@@ -116,10 +113,14 @@ def advance_lines(method: Implicit, split: bool = False) -> tuple[str, list[str]
     needed = stages(method)
     lines = ""
     for place, i in enumerate(needed):
-        terms = {n: [(f"k{n}{needed.index(j)}", w) for j, w in _entries(method.a[i][:i])] for n in STATE}
+        terms = {
+            n: [(f"k{n}{needed.index(j)}", w) for j, w in _entries(method.a[i][:i])] for n in STATE
+        }
         if split:
             for n in STATE[3:]:
-                terms[n] += [(f"f{n}{needed.index(j)}", w) for j, w in _entries(method.a_explicit[i])]
+                terms[n] += [
+                    (f"f{n}{needed.index(j)}", w) for j, w in _entries(method.a_explicit[i])
+                ]
         base = [f"p{n}{place}" for n in STATE]
         lines += "".join(
             f"    {b} = {_combined(n, terms[n])}\n" for b, n in zip(base, STATE, strict=True)
@@ -164,8 +165,9 @@ def proceed_lines() -> tuple[str, list[str]]:
     """Source of a step of that formula, with the past p0 ... p6, and its ends."""
     lines = "    c, g = weights_of_past(h, p6)\n"
     base = ", ".join(f"{n} + c * p{k}" for k, n in enumerate(STATE))
-    lines += f"    {', '.join(f'e{n}' for n in STATE)} = settle({base}, {QUIET}, g, age + h, C, S0, L, t0)\n"
-    return lines, [f"e{n}" for n in STATE]
+    ends = [f"e{n}" for n in STATE]
+    lines += f"    {', '.join(ends)} = settle({base}, {QUIET}, g, age + h, C, S0, L, t0)\n"
+    return lines, ends
 
 
 def _entries(row: Sequence[float]) -> list[tuple[int, float]]:

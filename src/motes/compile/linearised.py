@@ -63,7 +63,7 @@ RESIDUALS
         last = size
     # Where rounding ended it, that is as near as can be; elsewhere there is no solution.
     if not size <= F(1e-3) * whole:
-        k[3] = F(1e309)
+        k[0], k[3] = F(1e309), F(1e309)
 """
 """`together` finds the slopes k of all stages, six numbers each, by simplified Newton iterations;
 G holds a further acceleration for each stage. Sizes are in m/s."""
@@ -82,12 +82,36 @@ def shifted(x, y, z, vx, vy, vz, M, pivots, h, age, C, S, L, t):
 """
 
 
+SETTLE = """
+
+@inline
+def settle(px, py, pz, qx, qy, qz, gx, gy, gz, g, age, C, S, L, t):
+    k, G = empty(6, F), empty(3, F)
+    G[0], G[1], G[2] = gx, gy, gz
+    together(px, py, pz, qx, qy, qz, G, k, g, age, C, S, L, t)
+    return (
+        px + g * k[0], py + g * k[1], pz + g * k[2],
+        qx + g * k[3], qy + g * k[4], qz + g * k[5],
+    )
+"""
+"""A stage that stands for itself, of a particle that flows carry as well."""
+
+
+def settle_text(precision: str) -> str:
+    """What `implicit.settle_text` gives, where flows make the equations six."""
+    return _together_text([[1.0]], [0.0], precision) + SETTLE
+
+
 def together_text(method: Implicit, precision: str) -> str:
     """`rate`, `linearise` and `together` for a method whose stages belong together."""
     needed = stages(method)
-    rows = [[method.a[i][j] for j in needed] for i in needed]
+    rows = [[float(method.a[i][j]) for j in needed] for i in needed]
+    return _together_text(rows, [float(method.c[i]) for i in needed], precision)
+
+
+def _together_text(rows: list[list[float]], shares: list[float], precision: str) -> str:
     table = "".join(
-        f"    a[{i}, {j}] = F({float(w)!r})\n" for i, row in enumerate(rows) for j, w in enumerate(row)
+        f"    a[{i}, {j}] = F({w!r})\n" for i, row in enumerate(rows) for j, w in enumerate(row)
     )
     residuals = ""
     for i, row in enumerate(rows):
@@ -96,7 +120,7 @@ def together_text(method: Implicit, precision: str) -> str:
             for n, name in enumerate(STATE)
         ]
         push = ", ".join(f"G[{3 * i + n}]" for n in range(3))
-        when = f"age + F({float(method.c[needed[i]])!r}) * h, C, S{i}, L, t{i}"
+        when = f"age + F({shares[i]!r}) * h, C, S{i}, L, t{i}"
         residuals += f"        f = rate({', '.join(moved)}, {push}, {when})\n"
         residuals += "        for n, part in enumerate(f):\n"
         residuals += f"            r[{6 * i} + n] = part - k[{6 * i} + n]\n"

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from motes.compile.motion import Motion, stage_times
+from motes.compile.advance import stage_times
+from motes.compile.motion import Motion
 from motes.compile.straight import HELD
 from motes.compile.surfaces import Surfaces
 from motes.compile.text import AXES, STATE, Text
@@ -17,7 +18,7 @@ from motes.tableau import BackwardDifference, Explicit, Implicit, Nystrom, Rosen
 
 
 def write_staged(text: Text, motion: Motion) -> None:
-    """Write `slope` (for Runge-Kutta methods), `settled` or `led` (implicit ones), `kick` and `drift`.
+    """Write `slope` (Runge-Kutta methods), `settled` or `led` (implicit ones), `kick` and `drift`.
 
     `settled` solves a stage of each row with its push given: Y becomes base + dt f(Y). Where stages
     belong together it finds the slopes of all of them, from base, with a push for each. `eased` is

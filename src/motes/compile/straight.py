@@ -6,7 +6,8 @@ With solids, a row whose path might meet one is held: it is left as it was and l
 
 from __future__ import annotations
 
-from motes.compile.motion import Motion, stage_times, write_potential
+from motes.compile.advance import stage_times
+from motes.compile.motion import Motion, write_potential
 from motes.compile.surfaces import Surfaces
 from motes.compile.text import AXES, STATE, Text
 from motes.compile.threat import END
@@ -95,7 +96,8 @@ def _write_step(
     step = "proceed" if before else "advance"
     body += f"            C = {loop.columns}\n            {ends} = {step}({call})\n"
     if before:  # A row that is held forgets its past in the exceptions pass.
-        body += "".join(f"            p{k}[i] = n{n} - {n}[i]\n" for k, n in enumerate(STATE))
+        for k, n in enumerate(STATE):
+            body += f"            p{k}[i] = {f'n{n} - {n}[i]' if n in loop.state else 'F(0.0)'}\n"
         body += "            p6[i] = F(1.0) / h\n"
     marks = []
     if surfaces is not None:

@@ -18,17 +18,17 @@ from motes.errors import SceneError
 from motes.group.capture import Captures
 from motes.group.constrain import Constraints, Ground
 from motes.group.contacts import Contacts, Planes
+from motes.group.implicit import backward_difference, one_by_one, together
 from motes.group.lasting import Body, Lasting
 from motes.group.members import Bodies, Member, Movers, Occasion
-from motes.group.implicit import backward_difference, one_by_one, together
 from motes.group.methods import nystrom, runge_kutta, split
 from motes.group.nearby import Nearby
-from motes.group.rosenbrock import rosenbrock
 from motes.group.partners import Interactions, having, kernel, named, partners, values
+from motes.group.rosenbrock import rosenbrock
 from motes.interact.arrange import Box
 from motes.state import Particles
 from motes.step import Interval, Stepper
-from motes.tableau import BackwardDifference, Explicit, Implicit, Nystrom, Rosenbrock, Splitting
+from motes.tableau import BackwardDifference, Explicit, Nystrom, Rosenbrock, Splitting
 
 
 class Group:
@@ -65,8 +65,8 @@ class Group:
             )
         if isinstance(self.method, Nystrom) and self.nearby.depends_on_velocity:
             raise SceneError(
-                f"{who} by a law that depends on velocities, and nystrom5 is for forces that follow "
-                "from place and time alone. Choose rk4 or dopri5."
+                f"{who} by a law that depends on velocities, and nystrom5 is for forces that "
+                "follow from place and time alone. Choose rk4 or dopri5."
             )
         if isinstance(self.method, Rosenbrock) and any(motion.limits for motion in motions):
             raise SceneError(

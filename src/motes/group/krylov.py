@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.linear import KRYLOV, combine_basis, dot, orthogonalise
+from motes.linear import combine_basis, dot, orthogonalise
 
 Vector = NDArray[np.float64]
 
@@ -22,23 +22,32 @@ NEWTON = 40
 FORCING = 1e-3
 """What a linear system may be off, as a share of its right side; so much better is an iteration."""
 
+SPACE = 200
+"""Most vectors of a Krylov space: stiffness c needs some sqrt(c) of them."""
+
+MEMORY = 50_000_000
+"""Most numbers in one."""
+
 LEAST = 1e-6
 """Share of an iteration's way below which it is not shortened further."""
 
 
-def gmres(apply: Callable[[Vector], Vector], right: Vector, tolerance: float) -> Vector:
-    """The x for which apply(x) is nearest to `right`, of a Krylov space of at most 60 vectors.
+def gmres(
+    apply: Callable[[Vector], Vector], right: Vector, tolerance: float
+) -> tuple[Vector, float]:
+    """The x of a Krylov space for which apply(x) is nearest to `right`, and how far it is off.
 
-    `tolerance` is relative to the right side's length. Saad and Schultz 1986.
+    Both `tolerance` and what is returned are relative to the right side's length. Saad and Schultz
+    1986.
     """
-    length, most = norm(right), min(KRYLOV, right.size)
+    length, most = norm(right), min(SPACE, right.size, max(MEMORY // max(right.size, 1), 10))
     result = np.zeros_like(right)
     if length == 0.0 or not math.isfinite(length):
-        return result
+        return result, 0.0 if length == 0.0 else math.inf
     basis = np.zeros((most + 1, right.size))
     triangle, turns, sides = np.zeros((most + 1, most)), np.zeros((2, most)), np.zeros(most + 1)
     basis[0], sides[0] = right / length, length
-    j = 0
+    j, left = 0, length
     while j < most:
         basis[j + 1] = apply(basis[j])
         j += 1
@@ -46,7 +55,7 @@ def gmres(apply: Callable[[Vector], Vector], right: Vector, tolerance: float) ->
         if not left > tolerance * length:
             break
     combine_basis(basis, j, triangle, sides, result)
-    return result
+    return result, left / length
 
 
 def newton(
@@ -71,7 +80,7 @@ def newton(
             step = shift(v)
             return v - (respond(x + step * v) - start) / step
 
-        way, share = gmres(linear, rest, FORCING), 1.0
+        way, share = gmres(linear, rest, FORCING)[0], 1.0
         while True:
             trial = x + share * way
             later = respond(trial)
@@ -86,7 +95,7 @@ def newton(
         x[:], found, rest = trial, later, better
         moved = change()
         if share == 1.0 and FORCING * moved <= 1.0:
-            return moved
+            break
     return moved
 
 

@@ -23,6 +23,7 @@ from motes.tableau import Explicit, Nystrom, Splitting
 if TYPE_CHECKING:
     from motes.group.group import Group
 
+
 def split(
     group: Group, members: dict[str, Member], interval: Interval, method: Splitting, memory: Lasting
 ) -> None:

@@ -19,11 +19,15 @@ from motes.group.krylov import Vector, gmres
 from motes.group.lasting import Lasting
 from motes.group.members import Member
 from motes.group.methods import at, combined
+from motes.group.stages import unsolved
 from motes.step import Interval
 from motes.tableau import Rosenbrock
 
 if TYPE_CHECKING:
     from motes.group.group import Group
+
+FAR = 1e-2
+"""What a linear system may be off at most, as a share of its right side."""
 
 Members = dict[str, Member]
 Blocks = dict[str, NDArray[Any]]
@@ -68,12 +72,13 @@ class _Solve:
         self, group: Group, members: Members, interval: Interval, memory: Lasting, bases: Blocks
     ) -> None:
         self.members, self.interval, self.bases = members, interval, bases
-        self.interact: Callable[[], None] = partial(
-            group.interact, members, interval.begin, memory
-        )
+        self.interact: Callable[[], None] = partial(group.interact, members, interval.begin, memory)
         self.memory = memory
         self.rounding = float(np.finfo(next(iter(bases.values())).dtype).eps)
-        self.sizes = [max(float(np.abs(b[k : k + 3]).max(initial=0.0)) for b in bases.values()) for k in (0, 3)]
+        self.sizes = [
+            max(float(np.abs(b[k : k + 3]).max(initial=0.0)) for b in bases.values())
+            for k in (0, 3)
+        ]
 
     def __call__(self, right: Blocks) -> Blocks:
         still = {name: np.zeros_like(b) for name, b in right.items()}
@@ -82,7 +87,9 @@ class _Solve:
         def rest(q: Vector) -> Vector:
             return q - self.caused(self.led(still, q))
 
-        q = gmres(rest, self.caused(self.led(right, quiet)), self.rounding**0.6)
+        q, left = gmres(rest, self.caused(self.led(right, quiet)), self.rounding**0.6)
+        if not left < FAR:
+            raise unsolved(self.interval)
         return self.led(right, q)
 
     def led(self, right: Blocks, q: Vector) -> Blocks:
@@ -100,10 +107,13 @@ class _Solve:
         """How the pushes change along u: their derivative times u."""
         x, v = self.sizes[0] or 1.0, self.sizes[1] or self.sizes[0] / self.interval.length or 1.0
         far = max(
-            max(float(np.abs(u[:3]).max(initial=0.0)) / x, float(np.abs(u[3:]).max(initial=0.0)) / v)
+            max(
+                float(np.abs(u[:3]).max(initial=0.0)) / x, float(np.abs(u[3:]).max(initial=0.0)) / v
+            )
             for u in ways.values()
         )
-        step, total = self.rounding**0.4 / (far or 1.0), 0.0
+        step: float = self.rounding**0.4 / (far or 1.0)
+        found = []
         for sign in (1, -1):
             for name, m in self.members.items():
                 m.y[:, : m.alive] = self.bases[name] + m.y.dtype.type(sign * step) * ways[name]
@@ -111,5 +121,5 @@ class _Solve:
             self.interact()
             self.memory.push = None
             pushes = np.concatenate([m.push.ravel() for m in self.members.values()]).astype(float)
-            total = total + sign * pushes
-        return np.asarray(total / (2 * step))
+            found.append(pushes)
+        return np.asarray((found[0] - found[1]) / (2 * step))

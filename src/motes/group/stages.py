@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from motes.compile.implicit import ITERATIONS
 from motes.errors import SimulationError
-from motes.group.krylov import Vector, newton, norm
+from motes.group.krylov import Vector, newton
 from motes.group.lasting import Lasting
 from motes.group.members import Member
 from motes.step import Interval
@@ -32,6 +32,14 @@ MILD = 0.5
 """Factor by which a round must come nearer, or Newton's method takes over."""
 
 Members = dict[str, Member]
+
+
+def unsolved(interval: Interval) -> SimulationError:
+    """What to say where no solution was found."""
+    return SimulationError(
+        f"the equations of a step at t = {interval.begin:.6g} s have no solution: the interaction "
+        f"is too stiff for its length, {interval.length:g} s. Try a smaller step."
+    )
 
 
 class Stages:
@@ -56,12 +64,12 @@ class Stages:
         self.pushes = {
             name: np.zeros((len(times), 3, m.alive), m.y.dtype) for name, m in members.items()
         }
+        self._rate = 0.0
         self._before = self._states = [self._now()]
 
     def settle(self, interval: Interval) -> None:
         """Solve. Raises SimulationError where there is no solution."""
-        start = self._first()
-        x, change, last = start, math.inf, math.inf
+        x, change, last = self._first(), math.inf, math.inf
         for _ in range(ITERATIONS):
             found = self.respond(x)
             change = self.change()
@@ -69,14 +77,11 @@ class Stages:
                 break
             x, last = found, change
         if not change <= ROUNDED:
-            x = x if norm(x) < math.inf else start
+            x = np.zeros_like(x)  # As if nobody pushed: pushes of stiff laws would lead far astray.
+            self._rate = 1 / math.sqrt(self.lever)
             change = newton(self.respond, x, self._shift, self.change)
         if not change <= ROUNDED:
-            raise SimulationError(
-                f"the equations of a step at t = {interval.begin:.6g} s have no solution: the "
-                f"interaction is too stiff for its length, {interval.length:g} s. "
-                "Try a smaller step."
-            )
+            raise unsolved(interval)
 
     def respond(self, x: Vector) -> Vector:
         """The pushes that the states cause which pushes x lead to."""
@@ -102,7 +107,7 @@ class Stages:
         """How far the last states are from those before, in roundings of the largest number."""
         before, self._before = self._before, self._states
         pairs = zip(self._states, before, strict=False)
-        return max(_change(new[n], old[n]) for new, old in pairs for n in new)
+        return max(_change(new[n], old[n], self._rate) for new, old in pairs for n in new)
 
     def _first(self) -> Vector:
         """The pushes where everybody is now, for each stage."""
@@ -114,7 +119,9 @@ class Stages:
 
     def _shift(self, v: Vector) -> float:
         """A way along v on which positions change in half of their digits."""
-        size = max(float(np.abs(m.y[:3, : m.alive]).max(initial=0.0)) for m in self.members.values())
+        size = max(
+            float(np.abs(m.y[:3, : m.alive]).max(initial=0.0)) for m in self.members.values()
+        )
         rounding = float(np.finfo(next(iter(self.members.values())).y.dtype).eps)
         return math.sqrt(rounding) * (size or 1.0) / (self.lever * float(np.abs(v).max()))
 
@@ -122,12 +129,16 @@ class Stages:
         return {name: m.y[:, : m.alive].copy() for name, m in self.members.items()}
 
 
-def _change(state: NDArray[Any], before: NDArray[Any]) -> float:
-    """Largest change of positions and of velocities, in roundings of their largest number."""
-    result = 0.0
+def _change(state: NDArray[Any], before: NDArray[Any], rate: float) -> float:
+    """Largest change of positions and of velocities, in roundings of their largest number.
+
+    Where a law is stiff, velocities are no surer than positions times a rate [1/s].
+    """
+    result, place = 0.0, 0.0
     for block, old in ((state[:3], before[:3]), (state[3:], before[3:])):
-        size = float(np.abs(block).max(initial=0.0)) * float(np.finfo(state.dtype).eps)
+        size = max(float(np.abs(b).max(initial=0.0)) for b in (block, old))
+        size, place = max(size, rate * place), size
         moved = float(np.abs(block - old).max(initial=0.0))
         if moved:
-            result = max(result, moved / size)
+            result = max(result, moved / (size * float(np.finfo(state.dtype).eps)))
     return result if np.isfinite(state).all() else math.inf

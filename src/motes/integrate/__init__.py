@@ -18,7 +18,7 @@ def names() -> tuple[str, ...]:
 
 def methods() -> dict[str, Table]:
     """All methods by name, in alphabetical order."""
-    return {name: table(name) for name in names()}
+    return {name: method(name) for name in names()}
 
 
 @cache

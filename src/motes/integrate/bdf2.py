@@ -1,7 +1,7 @@
 """The second backward differentiation formula: stiff problems with one solve a step.
 
-Hairer and Wanner, Solving Ordinary Differential Equations II, section V.1. Backward Euler
-makes the first step.
+Backward Euler makes the first step; in a scene, the first after every birth and impact as well.
+Hairer and Wanner, Solving Ordinary Differential Equations II, section V.1.
 """
 
 from motes.tableau import BackwardDifference
