@@ -50,10 +50,17 @@ def stage_times(method: Table) -> tuple[float, ...]:
     if isinstance(method, Rosenbrock):
         return linearised.rosenbrock_times(method)
     if isinstance(method, BackwardDifference):
-        return (1.0,)
+        return stage_times(_without_past())
     kicks = method.times
     middles = [(a + b) / 2 for a, b in pairwise(kicks)]
     return tuple(sorted({*kicks, *middles}))
+
+
+def _without_past() -> Implicit:
+    """What takes a particle through a step in which it is born or bounces, in place of bdf2."""
+    found = integrate.method("sdirk2")
+    assert isinstance(found, Implicit)
+    return found
 
 
 class _Writer:
@@ -162,14 +169,13 @@ class _Writer:
         else:
             source = linearised if self.motion.flows else implicit
             self.text.add(source.settle_text(precision))
-            start = method if isinstance(method, Implicit) else integrate.method("backward_euler")
-            assert isinstance(start, Implicit)
-            self._advance(method, *implicit.advance_lines(start, split))
+            alone = method if isinstance(method, Implicit) else _without_past()
+            self._advance(method, *implicit.advance_lines(alone, split))
         if isinstance(method, BackwardDifference):
             self.text.add(implicit.PAST)
             past = ", ".join(f"p{k}" for k in range(self.motion.remembers))
             lines, ends = implicit.proceed_lines()
-            head = f"({', '.join(STATE)}, {past}, age, C, S0, L, t0, h)"
+            head = f"({', '.join(STATE)}, {past}, age, C, S0, S1, L, t0, t1, h)"
             self.text.add(f"@inline\ndef proceed{head}:\n{lines}    return {', '.join(ends)}\n")
 
     def splitting(self, method: Splitting) -> None:

@@ -166,7 +166,7 @@ def proceed_lines() -> tuple[str, list[str]]:
     lines = "    c, g = weights_of_past(h, p6)\n"
     base = ", ".join(f"{n} + c * p{k}" for k, n in enumerate(STATE))
     ends = [f"e{n}" for n in STATE]
-    lines += f"    {', '.join(ends)} = settle({base}, {QUIET}, g, age + h, C, S0, L, t0)\n"
+    lines += f"    {', '.join(ends)} = settle({base}, {QUIET}, g, age + h, C, S1, L, t1)\n"
     return lines, ends
 
 

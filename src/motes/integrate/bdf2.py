@@ -1,6 +1,7 @@
 """The second backward differentiation formula: stiff problems with one solve a step.
 
-Backward Euler makes the first step; in a scene, the first after every birth and impact as well.
+Backward Euler makes the first step. In a scene sdirk2 takes particles through steps in which they are
+born or bounce, and backward Euler makes the first one after.
 Hairer and Wanner, Solving Ordinary Differential Equations II, section V.1.
 """
 
