@@ -1,4 +1,4 @@
-"""Every time-stepping method through the whole engine: order, stability, what it does not go with."""
+"""Every time-stepping method through the whole engine: order, stability, what it refuses."""
 
 from __future__ import annotations
 
@@ -56,8 +56,9 @@ def test_every_method_has_its_order_in_a_scene(name: str) -> None:
     """|x_h - x| = C h^p, with forces that follow curves over time and depend on the position."""
     exact = flown("verner9", 1 / 64, curved_forces())
     measured = order_of(lambda h: flown(name, h, curved_forces()), exact, HALVED.get(name, 128))
+    # Of the high orders, the next term of the error shows as well.
     order = method(name).order
-    assert measured == pytest.approx(order, abs=0.25 if order < 8 else 0.8)
+    assert order - 0.25 < measured < order + (0.25 if order < 5 else 0.85)
 
 
 IMPLICIT = [name for name, table in methods().items() if table.implicit]

@@ -8,8 +8,7 @@ import math
 import pytest
 
 from motes import rooted_trees
-from motes.errors import SceneError
-from motes.integrate import method, methods
+from motes.integrate import methods
 from motes.tableau import Explicit, Implicit, Splitting, TableauError
 
 NUMBERS = ("a", "a_explicit", "b", "b_position", "c", "d", "drifts", "g", "kicks")
@@ -112,19 +111,3 @@ def test_rows_of_implicit_tables_are_whole():
                 row[j] == 0 for i, row in enumerate(table.a) for j in range(i + 1, len(row))
             )
             assert table.diagonal == diagonal
-
-
-def test_scenes_refuse_what_they_cannot_run():
-    """Each with its reason, and with methods that scenes take instead."""
-    reasons = {
-        "bdf2": "remembers the step before",
-        "nystrom5": "without drag or wind",
-        "radau5": "stages are solved together",
-        "rodas4": "derivatives",
-    }
-    for name, table in methods().items():
-        if name not in reasons:
-            assert method(name) is table
-        else:
-            with pytest.raises(SceneError, match=f"{reasons[name]}.*of these, sdirk2"):
-                method(name)

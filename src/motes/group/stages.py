@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 ROUNDED = 1e3
 """Roundings that a stage of a group may still be off where its iteration ended."""
 
+SETTLED = 10.0
+"""Roundings below which what no longer comes nearer has settled."""
+
 MILD = 0.5
 """Factor by which a round must come nearer, or Newton's method takes over."""
 
@@ -76,7 +79,7 @@ class Stages:
             if change <= 1 or not change < MILD * last:
                 break
             x, last = found, change
-        if not change <= ROUNDED:
+        if not change <= SETTLED:
             x = np.zeros_like(x)  # As if nobody pushed: pushes of stiff laws would lead far astray.
             self._rate = 1 / math.sqrt(self.lever)
             change = newton(self.respond, x, self._shift, self.change)
