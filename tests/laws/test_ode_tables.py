@@ -8,7 +8,8 @@ import math
 import pytest
 
 from motes import rooted_trees
-from motes.integrate import methods
+from motes.integrate import method, methods
+from motes.ode.stability import error_constant
 from motes.tableau import Explicit, Implicit, Splitting, TableauError
 
 NUMBERS = ("a", "a_explicit", "b", "b_position", "c", "d", "drifts", "g", "kicks")
@@ -111,3 +112,15 @@ def test_rows_of_implicit_tables_are_whole():
                 row[j] == 0 for i, row in enumerate(table.a) for j in range(i + 1, len(row))
             )
             assert table.diagonal == diagonal
+
+
+def test_error_constants_are_those_of_the_books():
+    """Euler 1/2; bdf2 1/3; leapfrog: sqrt of the squares of its three third-order defects."""
+    assert error_constant(method("euler")) == pytest.approx(1 / 2)
+    assert error_constant(method("bdf2")) == pytest.approx(1 / 3)
+    # Velocity: sum b c^2 - 1/3 and sum b_i a_ij - 1/6; position: sum b_position c - 1/6.
+    assert error_constant(method("leapfrog")) == pytest.approx(
+        math.hypot(1 / 2 - 1 / 3, 1 / 4 - 1 / 6, 0 - 1 / 6)
+    )
+    for name, table in methods().items():
+        assert error_constant(table) > 1e-7, name
