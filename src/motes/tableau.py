@@ -281,6 +281,11 @@ class Nystrom:
         return rooted_trees.nystrom_weight(self.c, self.a)
 
     @property
+    def ends(self) -> tuple[Numbers, Numbers]:
+        """Weights of the accelerations in position and velocity at the end."""
+        return self.b_position, self.b
+
+    @property
     def stages(self) -> int:
         """Evaluations of the acceleration in a step."""
         return len(self.b)
@@ -306,7 +311,7 @@ class Splitting:
         if len(self.kicks) != len(self.drifts) + 1:
             raise TableauError("a splitting has one kick more than drifts; the last may be 0")
         _check("drifts: ", 1, 1, self.drifts, [1.0] * len(self.drifts), 1.0)
-        _check_nystrom(self.order, self.kicks, self.b_position, self.weight)
+        _check_nystrom(self.order, *reversed(self.ends), self.weight)
 
     @property
     def weight(self) -> rooted_trees.Weight:
@@ -316,14 +321,10 @@ class Splitting:
         return rooted_trees.nystrom_weight(c, a)
 
     @property
-    def b(self) -> Numbers:
-        """Weights of the accelerations in the velocity at the end, as a Nystrom method."""
-        return self.kicks
-
-    @property
-    def b_position(self) -> Numbers:
-        """Weights of the accelerations in the position at the end."""
-        return tuple(kick * (1 - time) for kick, time in zip(self.kicks, self.times, strict=True))
+    def ends(self) -> tuple[Numbers, Numbers]:
+        """Weights of the accelerations in position and velocity at the end."""
+        left = [1 - time for time in self.times]
+        return tuple(k * t for k, t in zip(self.kicks, left, strict=True)), self.kicks
 
     @property
     def stages(self) -> int:

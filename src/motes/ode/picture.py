@@ -272,8 +272,9 @@ def _region(axes: Axes, of: Problem, method: str, step: float, exact: Array) -> 
     axes.set_title(f"{method}: stable where blue")
     axes.set_xlabel("real part (\u00d7: $h \\lambda$ along the path)")
     axes.set_ylabel("imaginary part")
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set_ylim(-0.9 * reach, 0.9 * reach)
+    axes.set_xlim(-1.15 * reach, 0.85 * reach)
+    axes.set_ylim(-0.88 * reach, 0.88 * reach)  # The pane's shape, so that the frame stays.
+    axes.set_aspect("equal")
 
 
 def _jacobian(of: Problem, y: Array) -> Array:

@@ -167,15 +167,16 @@ def error_constant(table: Table) -> float:
     order = table.order
     if isinstance(table, BackwardDifference):
         terms = [a * (-j) ** (order + 1) for j, a in enumerate(table.a)]
-        return abs(sum(terms)) / math.factorial(order + 1)
+        return float(abs(sum(terms)) / math.factorial(order + 1))
     trees = list(rooted_trees.trees(order + 1))
     defects: list[float] = []
     if isinstance(table, Nystrom | Splitting):
+        b_position, b_velocity = table.ends
         for tree in filter(rooted_trees.special, trees):
-            defects.append(_defect(table.b, table.weight(tree), rooted_trees.density(tree)))
+            defects.append(_defect(b_velocity, table.weight(tree), rooted_trees.density(tree)))
         for tree in filter(rooted_trees.special, rooted_trees.trees(order)):
             share = (order + 1) * rooted_trees.density(tree)
-            defects.append(_defect(table.b_position, table.weight(tree), share))
+            defects.append(_defect(b_position, table.weight(tree), share))
         return math.hypot(*defects)
     b = table.weights if isinstance(table, Rosenbrock) else table.b
     weight = table.weight if isinstance(table, Rosenbrock) else rooted_trees.weight(table.a)
