@@ -143,8 +143,9 @@ class Swarm:
         n, real = target.cells.row.size, self.real
         numbers = kernel.numbers(time, real)
         mine = tuple(target.column(key) for key in kernel.own)
-        if self._slots.size < n + LANES:
-            self._slots = np.arange(2 * n + LANES, dtype=np.int32)
+        most = max(n, *(source.cells.row.size for source in sources)) + LANES
+        if self._slots.size < most:
+            self._slots = np.arange(2 * most, dtype=np.int32)
         kept: Array = np.empty((kernel.sums, n + LANES if len(sources) > 1 else 0), real)
         nobody = np.full(n + LANES if any(s is not target for s in sources) else 0, -1, np.int32)
         parts = blocks(n, min(MOST, max(LEAST, -(-n // 8))))
@@ -159,10 +160,10 @@ class Swarm:
                 while begin < end:
                     run: Array = np.empty((room, 2), np.int64)
                     shift: Array = np.empty((room, 3), real)
-                    chosen: Array = np.empty(room, np.uint32)
+                    chosen: Array = np.empty(room + LANES, np.int32)
                     begin, needed = kernel(
                         numbers, mine, slot, target.cells.key, int(target.grid.shape[0]), theirs,
-                        source.grid, source.cells, begin, end, run, shift, chosen, hold,
+                        source.grid, source.cells, begin, end, run, shift, self._slots, chosen, hold,
                         source is not sources[0], source is sources[-1], kept,
                         target.cells.row, push,
                     )  # fmt: skip
