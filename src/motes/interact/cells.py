@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.interact.counting_sort import sorted_rows
+from motes.interact.counting_sort import counted_rows, sorted_rows
 from motes.jit import STRICT, blocks, jit, share
 
 ROWS = 1 << 15
@@ -204,15 +204,20 @@ def sort(position: NDArray[Any], grid: Grid, spare: int = 0) -> Cells:
     share(write, len(parts))
     total = int(np.prod(grid.shape, dtype=object))
     bits = (total - 1).bit_length()
-    key, row = sorted_rows(key, bits)
-    shift = max(0, bits - (_ENTRIES * max(n, 1)).bit_length())
-    first = np.zeros(((total - 1) >> shift) + 2, np.int32)
     ordered = np.zeros((3, n + spare), position.dtype)
+    if total <= _ENTRIES * n:
+        key, row, first = counted_rows(key, total)
+        shift = 0
+    else:
+        key, row = sorted_rows(key, bits)
+        shift = max(0, bits - (_ENTRIES * max(n, 1)).bit_length())
+        first = np.zeros(((total - 1) >> shift) + 2, np.int32)
 
     def index(part: int) -> None:
         begin, end = parts[part]
         _gather(position, row[begin:end], ordered[:, begin:end])
-        _index(key[max(begin - 1, 0) : end], begin, np.uint64(shift), end == n, first)
+        if total > _ENTRIES * n:
+            _index(key[max(begin - 1, 0) : end], begin, np.uint64(shift), end == n, first)
 
     share(index, len(parts))
     return Cells(ordered, row, key, first, np.uint64(shift))
