@@ -13,6 +13,7 @@ from motes.compile.gather import LANES, Gathering
 from motes.compile.pairs import Law
 from motes.interact.arrange import Box
 from motes.interact.cells import Cells, Grid, sort
+from motes.interact.counting_sort import Room, room_for
 from motes.interact.runs import inside, pick, rows_of_cells, rows_wanted
 from motes.jit import blocks, share
 
@@ -45,6 +46,7 @@ class _Sorted:
     grid: Grid
     cells: Cells
     body: Any
+    room: Room
     columns: dict[str, Array] = field(default_factory=dict)
 
     def column(self, key: str) -> Array:
@@ -54,7 +56,9 @@ class _Sorted:
             return axis
         if key not in self.columns:
             row = self.cells.row
-            out = self.columns[key] = np.zeros(row.size + LANES, self.cells.position.dtype)
+            real = self.cells.position.dtype
+            out = self.columns[key] = room_for(self.room, key, (row.size + LANES,), real)
+            out[row.size :] = 0
             values, parts = self.body.column(key), blocks(row.size, ROWS)
 
             def take(k: int) -> None:
@@ -80,6 +84,7 @@ class Swarm:
         self.systems = sorted({n for _, targets, sources in laws for n in (*targets, *sources)})
         self._slots: Array = np.empty(0, np.int32)
         self._room = ROOM
+        self._rooms: dict[str, Room] = {}
         self._alike: list[tuple[Gathering, str, tuple[str, ...]]] = []
         for target in self.systems:
             felt: dict[tuple[str, ...], list[Law]] = {}
@@ -116,7 +121,8 @@ class Swarm:
         reach = max(law.reach(time) for law in own or [law for law, _, _ in self.laws])
         low: Array = self.periodic.low.astype(real)
         size: Array = self.periodic.size.astype(real)
-        position: Array = np.empty((3, n), real)
+        room = self._rooms.setdefault(name, {})
+        position = room_for(room, "position", (3, n), real)
         parts = blocks(n, ROWS)
         found: Array = np.zeros((max(len(parts), 1), 2, 3), real)
 
@@ -129,11 +135,11 @@ class Swarm:
         bounds = np.where(size > 0, [np.zeros(3), self.periodic.size], ends).astype(float)
         box: Array = np.where(size > 0, size, np.inf).astype(real)
         cut = rows_of_cells(bounds, reach, 1, box, self.periodic.low)
-        cells = sort(position, cut, LANES)
+        cells = sort(position, cut, LANES, room)
         if (across := rows_wanted(cells.key)) > 1:
             cut = rows_of_cells(bounds, reach, across, box, self.periodic.low)
-            cells = sort(position, cut, LANES)
-        return _Sorted(cut, cells, body)
+            cells = sort(position, cut, LANES, room)
+        return _Sorted(cut, cells, body, room)
 
     def _gather(
         self, kernel: Gathering, target: _Sorted, sources: Sequence[_Sorted], time: float,

@@ -3,12 +3,28 @@
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motes.jit import blocks, jit, share
+
+Room = dict[str, NDArray[Any]]
+"""Arrays by what they are for, which serve again where they are large enough."""
+
+
+def room_for(room: Room | None, name: str, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+    """An array whose numbers are not set, from a room if there is one."""
+    size, kind = math.prod(shape), np.dtype(dtype)
+    if room is None:
+        return np.empty(shape, kind)
+    kept = room.get(name)
+    if kept is None or kept.size < size or kept.dtype != kind:
+        kept = room[name] = np.empty(size + size // 8, kind)
+    return kept[:size].reshape(shape)
+
 
 DIGIT = 11
 """Most bits that one pass sorts by: its counters fit the first cache."""
@@ -110,19 +126,21 @@ def _count_all(key: Any, counts: Any) -> None:
 
 
 def counted_rows(
-    key: NDArray[np.uint64], keys: int
+    key: NDArray[np.uint64], keys: int, room: Room | None = None
 ) -> tuple[NDArray[np.uint64], NDArray[np.int32], NDArray[np.int32]]:
     """`sorted_rows` for keys (n,) below `keys`, at most a few times n, and `first` (keys + 1,): how
     many rows have keys below each.
 
-    Rows that are almost in order already are read and written almost in order.
+    Rows that are almost in order already are read and written almost in order. What is returned
+    is in `room`, if one is given.
     """
     parts = blocks(len(key), max(1, -(-len(key) // HALVES)))
-    counts = np.empty((len(parts), keys), np.int32)
+    counts = room_for(room, "counts", (len(parts), keys), np.int32)
     share(lambda part: _count_all(key[slice(*parts[part])], counts[part]), len(parts))
-    first = np.empty(keys + 1, np.int32)
+    first = room_for(room, "first", (keys + 1,), np.int32)
     _starts(counts, first)
-    new_key, new_row = np.empty_like(key), np.empty(len(key), np.int32)
+    new_key = room_for(room, "new_key", key.shape, np.uint64)
+    new_row = room_for(room, "row", key.shape, np.int32)
 
     def put(part: int) -> None:
         begin, end = parts[part]
