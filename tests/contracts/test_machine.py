@@ -20,7 +20,7 @@ import motes.jit
 from motes.errors import SceneError
 from motes.jit import STRICT, Kernel, jit
 from motes.machine.lanes import bits as marks_of
-from motes.machine.lanes import lowest, put, settled, take
+from motes.machine.lanes import count, lowest, pack, put, settled, take
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning"),
@@ -587,6 +587,34 @@ def test_lanes_are_numbers_side_by_side() -> None:
         one(x, y, expected, told)
         np.testing.assert_array_equal(found, expected)
         np.testing.assert_array_equal(marks, told)
+
+
+@pytest.mark.parametrize("moves", [True, False])
+def test_marked_lanes_are_packed(moves: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lanes whose bits are set follow one another, with and without AVX2, as in plain Python."""
+    from motes.machine import target
+
+    if not moves:
+        monkeypatch.setattr(target, "moves_lanes", lambda: False)
+
+    def pack_some(x: Any, limit: Any, out: Any) -> Any:
+        held = np.uint64(0)
+        for i in range(0, x.size, 8):
+            marks = marks_of(take(x, i, 8) < limit)
+            pack(out, held, take(x, i, 8), marks)
+            held += count(marks)
+        return held
+
+    rng = np.random.default_rng(3)
+    for kind in (np.int32, np.float32, np.float64, np.int64):
+        x = rng.integers(0, 100, 512).astype(kind)
+        out = np.zeros(520, kind)
+        held = compiled(pack_some)(x, kind(40), out)
+        assert held == (x < 40).sum()
+        np.testing.assert_array_equal(out[:held], x[x < 40])
+    assert count(np.uint64(0b1011)) == 3
+    pack(out, 5, out[0], np.uint64(1))
+    assert out[5] == out[0]
 
 
 def test_lanes_go_the_same_way() -> None:
