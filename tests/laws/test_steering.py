@@ -150,8 +150,8 @@ OBSTACLES = {
 
 @pytest.mark.parametrize("kind", OBSTACLES)
 def test_every_solid_is_steered_around_before_it_is_hit(kind: str) -> None:
-    """A dozen birds side by side fly at a solid; the gap stays above 0, most of the margin is left,
-    they keep their speed, and without the force they would have hit it."""
+    """A dozen birds side by side fly at a solid: none hits it, none stops, and without the force
+    they would have hit it."""
     solids = [OBSTACLES[kind]] if OBSTACLES[kind] is not None else [
         motes.solid.Box(name="a", position=(5, 1.8, 0), size=(1, 2, 4), rotation=(0, 0, 30)),
         motes.solid.Sphere(name="b", position=(8, -1, 0), radius=1.4),
