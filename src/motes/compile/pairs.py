@@ -48,6 +48,7 @@ class Law:
         self._time = float("nan")
         self._values_now: dict[tuple[str, str], dict[str, Any]] = {}
         self._numbers_now: dict[Any, NDArray[Any]] = {}
+        self._reach: tuple[dict[str, Any], float] | None = None
         self._missing()
 
     def _missing(self) -> None:
@@ -98,7 +99,10 @@ class Law:
 
     def reach(self, time: float) -> float:
         """Support radius at a time [m]."""
-        return float(self._kernel("reach")(SimpleNamespace(**self.values(time))))
+        values = self.values(time)
+        if self._reach is None or self._reach[0] is not values:
+            self._reach = values, float(self._kernel("reach")(SimpleNamespace(**values)))
+        return self._reach[1]
 
     @cached_property
     def _fields(self) -> dict[str, int]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,17 +39,23 @@ def split(
     before = {
         name: m.y[3:, : m.alive].copy() for name, m in members.items() if group.constraints.laws
     }
-    for kick, drift, place in zip(method.kicks, (*method.drifts, 0.0), method.times, strict=True):
+    for kick, drift, place in _turns(method):
         time = _at(interval, place)
         if kick:
             group.interact(members, time, memory)
             for member in members.values():
-                member.each("kick", member.K, time, kick * h)
+                member.each("kick", member.K, numbers=(time, kick * h))
         if drift:
             group.constraints.apply(members, before, time, drift * h, partners, values)
             memory.push = None
             for member in members.values():
-                member.each("drift", member.K, time, drift * h)
+                member.each("drift", member.K, numbers=(time, drift * h))
+
+
+@cache
+def _turns(method: Splitting) -> list[tuple[float, float, float]]:
+    """Kick, drift after it and place in the step of every turn."""
+    return list(zip(method.kicks, (*method.drifts, 0.0), method.times, strict=True))
 
 
 def runge_kutta(
@@ -66,7 +73,7 @@ def runge_kutta(
         time = _at(interval, method.c[i])
         group.interact(members, time, memory)
         for name, member in members.items():
-            member.each("slope", slopes[name][i], member.K, time)
+            member.each("slope", slopes[name][i], member.K, numbers=(time,))
 
 
 def implicit_stages(
@@ -88,7 +95,7 @@ def implicit_stages(
         if not g:
             group.interact(members, time, memory)
             for name, member in members.items():
-                member.each("slope", slopes[name][place], member.K, time)
+                member.each("slope", slopes[name][place], member.K, numbers=(time,))
             continue
         known = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
         last = math.inf
@@ -97,7 +104,7 @@ def implicit_stages(
             group.interact(members, time, memory)
             memory.push = None
             for name, member in members.items():
-                member.each("settled", known[name], member.K, time, g)
+                member.each("settled", known[name], member.K, numbers=(time, g))
             change = max(_change(m.y[:, : m.alive], before[name]) for name, m in members.items())
             if change <= 1 or not change < last:
                 break
