@@ -23,11 +23,11 @@ from typing import Any
 
 from motes.errors import OutputError, SceneError
 from motes.files import written_whole
-from motes.pool import available_processors, blocks, share, share_out, threads
+from motes.pool import available_processors, blocks, even_blocks, share, share_out, threads
 
 __all__ = [
     "EXACT", "FAST", "STRICT", "Calls", "Kernel", "available_processors", "blocks", "bound",
-    "cache_folder", "each", "jit", "listen", "share", "threads",
+    "cache_folder", "each", "even_blocks", "jit", "listen", "share", "threads",
 ]  # fmt: skip
 
 FAST = frozenset({"reassoc", "contract", "arcp", "nsz"})

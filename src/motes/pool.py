@@ -154,6 +154,12 @@ def share_out(run: Callable[[Any, int], None], count: int) -> None:
     _together(work, count, lambda: setattr(counter, "value", count))
 
 
+def even_blocks(rows: int) -> list[tuple[int, int]]:
+    """Blocks of rows for a loop of a nanosecond a row: one where a second thread would cost more
+    than it brings, else many, so that threads have equal shares."""
+    return blocks(rows, 1 << 14 if rows <= 1 << 14 else 1 << 13)
+
+
 def blocks(rows: int, size: int) -> list[tuple[int, int]]:
     """Half-open ranges of at most `size` rows that cover `rows`."""
     return [(low, min(low + size, rows)) for low in range(0, rows, size)]

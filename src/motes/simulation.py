@@ -21,8 +21,8 @@ from motes.group import Group, named_systems
 from motes.group.capture import CAPTURE
 from motes.group.lasting import Lasting
 from motes.integrate import method
-from motes.interact.arrange import ROWS, Box, wrap, wrapped
-from motes.jit import blocks
+from motes.interact.arrange import Box, wrap, wrapped
+from motes.jit import even_blocks
 from motes.philox import channel
 from motes.record.energy import Matter, Measures, measure
 from motes.repeat import Repeats
@@ -274,7 +274,7 @@ class Simulation:
         if self._closed:
             for name, rows in state.systems.items():
                 head = rows.position, *self._edges
-                self._calls(("wrap", name), wrap, head, blocks(rows.count, ROWS))()
+                self._calls(("wrap", name), wrap, head, even_blocks(rows.count))()
         state.number += 1
 
     def _steps_before(self, time: float) -> int:

@@ -27,7 +27,7 @@ CAUTION = 1 - 2.0**-10
 """Share of the allowed way after which a list is stale: more than rounding takes away."""
 
 
-SHORT = 0.4
+SHORT = 0.36
 """Margin of the lists of particles as a share of that of the lists of clusters."""
 
 

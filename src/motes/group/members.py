@@ -12,13 +12,10 @@ from numpy.typing import NDArray
 from motes.group.contacts import Planes
 from motes.group.lasting import Body
 from motes.interact.arrange import Box
-from motes.jit import blocks
+from motes.jit import even_blocks
 from motes.repeat import Repeats
 from motes.state import Particles
 from motes.step import Stepper
-
-BLOCK = 1 << 15
-"""Rows of one kernel call."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +70,7 @@ class Member:
     push: NDArray[Any]
 
     def __post_init__(self) -> None:
-        self._calls, self._parts = Repeats(), blocks(self.alive, BLOCK)
+        self._calls, self._parts = Repeats(), even_blocks(self.alive)
         self._motion = self.rows.motion
 
     def fits(self, rows: Particles, alive: int) -> bool:

@@ -18,9 +18,9 @@ from motes.compile import implicit
 from motes.compile.staged import combine
 from motes.errors import SimulationError
 from motes.group.lasting import Lasting
-from motes.group.members import BLOCK, Member
+from motes.group.members import Member
 from motes.group.partners import partners, values
-from motes.jit import blocks, share
+from motes.jit import even_blocks, share
 from motes.step import Interval
 from motes.tableau import Explicit, Implicit, Splitting
 
@@ -134,7 +134,7 @@ def _combine(
 ) -> None:
     """Every member's state becomes base + h sum_j weights_j slopes_j."""
     for name, member in members.items():
-        parts, real = blocks(member.alive, BLOCK), member.y.dtype.type
+        parts, real = even_blocks(member.alive), member.y.dtype.type
         row = np.array(weights, float).astype(real)
         arguments = (bases[name], slopes[name], row, real(h), member.y)
         share(lambda k, a=arguments, p=parts: combine(*a, *p[k]), len(parts))  # type: ignore[misc]

@@ -19,15 +19,12 @@ from motes.compile.pairs import Law
 from motes.compile.text import AXES
 from motes.group.lasting import Body, Class, Lists
 from motes.interact.arrange import FAR, Arranged, Box, pack, pack_images, packed_values
-from motes.jit import blocks
+from motes.jit import even_blocks
 from motes.memory import allocate
 from motes.repeat import Repeats
 
 RECORDS = "records"
 """Name of the places of all slots, x, y, z and a fourth number that nobody reads."""
-
-ROWS = 1 << 15
-"""Rows of one task of a loop that is quick."""
 
 NO_MARKS: dict[type, Array] = {real: np.empty((0, 4), real) for real in (np.float32, np.float64)}
 """Marks of nobody, by type of numbers."""
@@ -127,7 +124,7 @@ class Sums:
     ) -> list[Call]:
         """Calls that write a system's places into records, and the longest ways."""
         n, images = arranged.order.size, arranged.ghost_of.size
-        parts = [(k, *part) for k, part in enumerate(blocks(n, ROWS))]
+        parts = [(k, *part) for k, part in enumerate(even_blocks(n))]
         moved = self._space((body.name, "moved"), (max(len(parts), 1), 2), np.float64)
         moved.fill(0)
         ways.append(moved)
@@ -137,7 +134,7 @@ class Sums:
         image = records, arranged.ghost_of, arranged.image, arranged.shift, n
         return [
             self._calls((body.name, "x"), pack, (body.motion, *place), parts),
-            self._calls((body.name, "images"), pack_images, image, blocks(images, ROWS)),
+            self._calls((body.name, "images"), pack_images, image, even_blocks(images)),
             partial(records[-1].fill, FAR),
         ]
 
@@ -180,12 +177,12 @@ class Sums:
         mine = tuple(packed[target][name] for name in own)
         limit = self.real(law.reach(time)) ** 2
         kernel = law.sweep(what)
-        calls: list[Call] = [partial(out.fill, 0)]
+        calls: list[Call] = []
         for source in sources:
             numbers = law.numbers(time, self.real, (target, source))
             records = packed[source][RECORDS]
             theirs = tuple(packed[source][name] for name in other)
-            head = numbers, mine, records, theirs, limit, out
+            head = numbers, mine, records, theirs, limit, not calls, out
             name = law.address, what, target, source
             calls.append(self._calls(name, kernel, head, found.short[target, source]))
         return out, calls
@@ -200,7 +197,7 @@ class Sums:
             sums, calls = self._summing(law, law.summed, target, sources, time, found, packed)
             mine = tuple(packed[target][name] for name in law.fields[0])
             order, push = found.arranged[target].order, pushes[target]
-            head, parts = (numbers, mine, sums, order, push), blocks(order.size, ROWS)
+            head, parts = (numbers, mine, sums, order, push), even_blocks(order.size)
             done += calls
             done.append(self._calls((law.address, target), law.finish, head, parts))
         return done
