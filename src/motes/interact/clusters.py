@@ -19,7 +19,7 @@ from motes.interact.arrange import CLUSTER, FAR, Arranged
 from motes.interact.cells import Grid
 from motes.jit import STRICT, each, jit
 from motes.machine.shuffles import LANES, near_slots, taken_apart
-from motes.memory import allocate
+from motes.memory import afford, allocate
 
 
 class Part(NamedTuple):
@@ -297,6 +297,7 @@ def _carried_out(kernel: Any, head: Any, work: list[Any], room: Room) -> list[in
         waiting = [one for one in work if state[one[0], 0] < one[1].size - 1]
         for one in waiting:
             work[one[0]] = _wider(one, *state[one[0], :2].tolist())
+            afford(sum(part[-1].nbytes for part in work), "a list of neighbours")
         waiting = [work[one[0]] for one in waiting]
     room[:] = [one[-1] for one in work]
     return [max(LANES, longest) for longest in state[:, 2].tolist()]
