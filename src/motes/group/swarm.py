@@ -169,8 +169,8 @@ class Swarm:
                     chosen: Array = np.empty(room + LANES, np.int32)
                     begin, needed = kernel(
                         numbers, mine, slot, target.cells.key, int(target.grid.shape[0]), theirs,
-                        source.grid, source.cells, begin, end, run, shift, self._slots, chosen, hold,
-                        source is not sources[0], source is sources[-1], kept,
+                        source.grid, source.cells, begin, end, run, shift, self._slots, chosen,
+                        hold, source is not sources[0], source is sources[-1], kept,
                         target.cells.row, push,
                     )  # fmt: skip
                     room = self._room = max(room, 2 * needed)
