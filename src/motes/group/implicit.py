@@ -45,20 +45,20 @@ def one_by_one(
         if g and split:
             _unpushed(members)
             for name, m in members.items():
-                m.each("settled", known[name], m.K, time, g)
+                m.each("settled", known[name], m.K, numbers=(time, g))
         elif g:
             _settle(group, members, memory, interval, time, g, known)
         else:
             _unpushed(members) if split else group.interact(members, time, memory)
             for name, m in members.items():
-                m.each("slope", slopes[name][place], m.K, time)
+                m.each("slope", slopes[name][place], m.K, numbers=(time,))
         if g:
             for name, m in members.items():
                 slopes[name][place] = (m.y[:, : m.alive] - known[name]) / m.y.dtype.type(g)
         if split:
             group.interact(members, time, memory)
             for name, m in members.items():
-                m.each("eased", slopes[name][s + place], m.K, time)
+                m.each("eased", slopes[name][s + place], m.K, numbers=(time,))
     weights = [method.b[i] for i in places]
     combined(members, bases, slopes, weights * 2 if split else weights, h)
     memory.push = None
@@ -79,7 +79,7 @@ def _settle(
     def solve(_: int) -> None:
         for name, m in members.items():
             m.push = stages.pushes[name][0]
-            m.each("settled", known[name], *(block[name] for block in more), m.K, time, g)
+            m.each("settled", known[name], *(block[name] for block in more), m.K, numbers=(time, g))
 
     stages = Stages(group, members, memory, [time], lambda: None, solve, g * g)
     stages.settle(interval)
@@ -97,7 +97,7 @@ def together(
         for name, m in members.items():
             m.push = stages.pushes[name].reshape(-1, m.alive)
             flat = slopes[name].reshape(-1, m.alive)
-            m.each("settled", bases[name], flat, m.K, interval.begin, h)
+            m.each("settled", bases[name], flat, m.K, numbers=(interval.begin, h))
 
     def solve(k: int) -> None:
         combined(members, bases, slopes, rows[k], h)

@@ -7,6 +7,7 @@ wherever something moves.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,9 +15,9 @@ from numpy.typing import NDArray
 
 from motes.compile.staged import combine
 from motes.group.lasting import Lasting
-from motes.group.members import BLOCK, Member
+from motes.group.members import Member
 from motes.group.partners import partners, values
-from motes.jit import blocks, share
+from motes.jit import even_blocks, share
 from motes.step import Interval
 from motes.tableau import Explicit, Nystrom, Splitting
 
@@ -32,17 +33,23 @@ def split(
     before = {
         name: m.y[3:, : m.alive].copy() for name, m in members.items() if group.constraints.laws
     }
-    for kick, drift, place in zip(method.kicks, (*method.drifts, 0.0), method.times, strict=True):
+    for kick, drift, place in _turns(method):
         time = at(interval, place)
         if kick:
             group.interact(members, time, memory)
             for member in members.values():
-                member.each("kick", member.K, time, kick * h)
+                member.each("kick", member.K, numbers=(time, kick * h))
         if drift:
             group.constraints.apply(members, before, time, drift * h, partners, values)
             memory.push = None
             for member in members.values():
-                member.each("drift", member.K, time, drift * h)
+                member.each("drift", member.K, numbers=(time, drift * h))
+
+
+@cache
+def _turns(method: Splitting) -> list[tuple[float, float, float]]:
+    """Kick, drift after it and place in the step of every turn."""
+    return list(zip(method.kicks, (*method.drifts, 0.0), method.times, strict=True))
 
 
 def runge_kutta(
@@ -60,7 +67,7 @@ def runge_kutta(
         time = at(interval, method.c[i])
         group.interact(members, time, memory)
         for name, member in members.items():
-            member.each("slope", slopes[name][i], member.K, time)
+            member.each("slope", slopes[name][i], member.K, numbers=(time,))
 
 
 def nystrom(
@@ -83,7 +90,7 @@ def nystrom(
         time = at(interval, method.c[i])
         group.interact(members, time, memory)
         for name, member in members.items():
-            member.each("slope", slopes[name][i], member.K, time)
+            member.each("slope", slopes[name][i], member.K, numbers=(time,))
     placed(1.0, method.b_position)
     positions = {name: m.y[:3, : m.alive].copy() for name, m in members.items()}
     combined(members, bases, slopes, method.b, h)
@@ -105,7 +112,7 @@ def combined(
 ) -> None:
     """Every member's state becomes base + h sum_j weights_j slopes_j."""
     for name, member in members.items():
-        parts, real = blocks(member.alive, BLOCK), member.y.dtype.type
+        parts, real = even_blocks(member.alive), member.y.dtype.type
         row = np.array(weights, float).astype(real)
         arguments = (bases[name], slopes[name], row, real(h), member.y)
         share(lambda k, a=arguments, p=parts: combine(*a, *p[k]), len(parts))  # type: ignore[misc]

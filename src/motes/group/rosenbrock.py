@@ -47,7 +47,7 @@ def rosenbrock(
         memory.push = None
         found = {name: np.empty_like(b) for name, b in bases.items()}
         for name, m in members.items():
-            m.each("slope", found[name], m.K, time)
+            m.each("slope", found[name], m.K, numbers=(time,))
         return found
 
     memory.push = None
@@ -100,7 +100,13 @@ class _Solve:
             last = first + 3 * m.alive
             m.push = q[first:last].reshape(3, m.alive).astype(m.y.dtype)
             found[name], first = np.empty_like(right[name]), last
-            m.each("led", right[name], found[name], m.K, self.interval.begin, self.interval.length)
+            m.each(
+                "led",
+                right[name],
+                found[name],
+                m.K,
+                numbers=(self.interval.begin, self.interval.length),
+            )
         return found
 
     def caused(self, ways: Blocks) -> Vector:
