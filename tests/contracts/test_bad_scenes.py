@@ -166,7 +166,7 @@ EXACT: dict[str, tuple[str | bytes, list[str]]] = {
     "unknown parameter": (
         '[[force]]\ntype = "drag"\nrat = 1',
         ['bad:3: force "drag" has no parameter "rat". Did you mean "rate"? '
-         "It takes rate [kg/s], wind [m/s]."],
+         "It takes rate [kg/s], wind [m/s], stiff."],
     ),
     "range": (
         '[[force]]\ntype = "drag"\nrate = -1.0',
