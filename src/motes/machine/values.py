@@ -106,3 +106,11 @@ def of_registers(type: Type, names: Sequence[str] | Iterator[str]) -> Value:
         strides = () if type.packed else tuple(next(source) for _ in range(type.axes))
         return View(type, address, shape, strides)
     return Known(None)
+
+
+class Written:
+    """Something that kernels call and that writes its own code."""
+
+    def write(self, writer: Any, values: Sequence[Value]) -> Value:
+        """Write the code of a call with given arguments; returns what it gives."""
+        raise NotImplementedError

@@ -28,7 +28,7 @@ def _spaced(value: Any) -> Any:
     return (v | (v << np.uint64(2))) & np.uint64(0x1249249249249249)
 
 
-@jit
+@jit(numba=False)
 def _write_keys(position: Any, low: Any, scale: Any, key: Any, order: Any, first: Any) -> None:
     for i in range(key.size):
         k = first + i
@@ -39,14 +39,14 @@ def _write_keys(position: Any, low: Any, scale: Any, key: Any, order: Any, first
         order[i] = k
 
 
-@jit
+@jit(numba=False)
 def _count(key: Any, shift: Any, histogram: Any) -> None:
     histogram[:] = 0
     for i in range(key.size):
         histogram[np.intp((key[i] >> shift) & np.uint64(histogram.size - 1))] += 1
 
 
-@jit
+@jit(numba=False)
 def _accumulate(histograms: Any) -> None:
     total = 0
     for digit in range(histograms.shape[1]):
@@ -56,7 +56,7 @@ def _accumulate(histograms: Any) -> None:
             total += count
 
 
-@jit
+@jit(numba=False)
 def _scatter(key: Any, order: Any, shift: Any, place: Any, new_key: Any, new_order: Any) -> None:
     for i in range(key.size):
         digit = np.intp((key[i] >> shift) & np.uint64(place.size - 1))

@@ -51,6 +51,9 @@ tolerance, as errors of many expansions cancel and the estimate is an upper boun
 ENOUGH = 5.0
 """How much less it must neglect at least, or it is made again."""
 
+EASIER = 2.0
+"""How many times less an expansion of the lower order may neglect: there are many of them."""
+
 TRIALS = 8
 """Trials before all is summed by pairs."""
 
@@ -70,6 +73,8 @@ class Plan:
 
     order: int
     """Highest degree of the expansions."""
+    low: int
+    """The same where fewer terms are enough."""
     leaf: int
     """Most particles in a leaf."""
     real: type
@@ -83,7 +88,7 @@ def plan(tolerance: float, law: str) -> Plan:
     digits = -math.log10(tolerance)
     real = np.float32 if tolerance >= SINGLE_FROM else np.float64
     order = min(max(2, int(1.2 * digits + 1.5)), HIGHEST[law != "plummer"])
-    return Plan(order=order, leaf=32 if digits < 4 else 48, real=real)
+    return Plan(order, max(order - 2, 1), leaf=32 if digits < 4 else 48, real=real)
 
 
 def multipole(
@@ -143,6 +148,7 @@ class Problem:
         return Limits(
             opening2=self.plan.opening**2,
             error=error,
+            easier=EASIER,
             force=force,
             rounding=rounding,
             few=max(self.plan.order**3 // 2, 16),
@@ -163,7 +169,7 @@ class Problem:
         pulled = a * self.targets.place[3, sample.rows]
         force = sample.mean_of_most(pulled) * self.targets.place.shape[1] or math.inf
         rounding = tolerance * scale
-        share, strictest = tolerance * GROWTH ** (self.plan.order - 2), math.inf
+        share, strictest = 4.0 * tolerance * GROWTH ** (self.plan.order - 2), math.inf
         kept = None
         for _ in range(TRIALS):
             # A sun's momentum hangs on single expansions, whose errors do not cancel.
@@ -208,7 +214,7 @@ class Problem:
 
     def _walk(self, ranges: NDArray[np.int64], tasks: int, limits: Limits) -> NDArray[Any]:
         """Sums at the targets in some ranges (k, 2) of rows, whole leaves, in a number of tasks."""
-        walk = walker(self.law, self.plan.real, self.potential, self.plan.order)
+        walk = walker(self.law, self.plan.real, self.potential, self.plan.order, self.plan.low)
         operations = translations(self.plan.order, self.law != "plummer")
         same, largest = self.targets is self.sources, largest_leaf(self.targets)
         rows = 4 if self.potential else 3

@@ -24,8 +24,8 @@ from motes.interact.gravity.expansions import (
     terms,
     unfolded,
 )
-from motes.interact.gravity.lanes import LANES
-from motes.interact.gravity.traced import (
+from motes.machine.traced import (
+    LANES,
     gathered,
     inverse_root,
     ones,
@@ -58,7 +58,8 @@ class Translations(NamedTuple):
     moments_to_local: Operation
     """(balls, chosen, own, table, e2, local): add to `local` (basis, LANES) the terms, in a cell
     with the ball `own`, of source cells whose balls and moments are rows `chosen` of two tables; e2
-    is the squared softening."""
+    is the squared softening. Moments of the first degree are taken for 0, as they are around
+    centers of mass."""
     lanes_to_local: Operation
     """(local, terms): add the lane sums of `local` (basis, LANES) to terms (basis,)."""
     local_to_local: Operation
@@ -113,9 +114,10 @@ def translations(order: int, harmonic: bool) -> Translations:
         given = gathered(table, chosen, len(basis))
         moments = {b: m * power[sum(b)] for b, m in zip(basis, given, strict=True)}
         power = powers(order, own[6] * inverse, ones(x))
+        some = [b for b in basis if sum(b) != 1]
         values = products(
             [
-                [(moments[b], slopes[plus(a, b)]) for b in basis if sum(a) + sum(b) <= order]
+                [(moments[b], slopes[plus(a, b)]) for b in some if sum(a) + sum(b) <= order]
                 for a in basis
             ]
         )

@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.interact.gravity.lanes import LANES
+from motes.interact.gravity.lanes import LANES, read, write
 from motes.interact.gravity.morton import LEVELS, morton_order
 from motes.interact.gravity.translations import padded, translations
-from motes.jit import blocks, jit, share
+from motes.jit import EXACT, blocks, jit, share
+from motes.machine.lanes import choose
 
 START, END, FIRST, NUMBER = 0, 1, 2, 3
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
@@ -76,7 +77,7 @@ def _first_of(key: Any, low: Any, high: Any, shift: Any, octant: Any) -> Any:
     return low
 
 
-@jit
+@jit(numba=False)
 def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
     """Write the rows of all cells; return their number, or 0 if there is no room.
 
@@ -131,7 +132,7 @@ def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
     return count
 
 
-@jit
+@jit(numba=False)
 def _permute(
     points: Any, mass: Any, low: Any, length: Any, order: Any, place: Any, first: Any, last: Any
 ) -> None:
@@ -143,7 +144,7 @@ def _permute(
         place[3, i] = mass[k]
 
 
-@jit
+@jit(numba=False)
 def unpermute(sums: Any, order: Any, result: Any, first: Any, last: Any) -> None:
     """Write columns `first` to `last` of sums in the tree's order to where they came from."""
     for row in range(sums.shape[0]):
@@ -151,7 +152,7 @@ def unpermute(sums: Any, order: Any, result: Any, first: Any, last: Any) -> None
             result[row, order[i]] = sums[row, i]
 
 
-@jit
+@jit(numba=False)
 def _measure(tree: Tree, cell: Any) -> None:
     """Fill in a cell's body, its children's being there."""
     cells, bodies, place = tree.cells, tree.bodies, tree.place
@@ -190,7 +191,7 @@ def _measure(tree: Tree, cell: Any) -> None:
     ball[BALL_RADIUS], ball[BALL_MASS] = cell_unit(np.sqrt(r2)), mass
 
 
-@jit
+@jit(numba=False)
 def _approach(tree: Tree, cell: Any, relative: bool) -> None:
     """Write a leaf's particles as the pairs see them."""
     start, end = tree.cells[cell, START], tree.cells[cell, END]
@@ -208,30 +209,32 @@ def _approach(tree: Tree, cell: Any, relative: bool) -> None:
 def _summation(order: int, harmonic: bool) -> Callable[..., None]:
     """Compiled function that fills in bodies, near and moments of cells in ranges (k, 2).
 
-    (tree, ranges, relative, place, chosen, sums) -> None; the last cell of a range is the first.
+    (tree, ranges, relative, place, chosen, ascending, sums) -> None; the last cell of a range is the first.
     """
     operations = translations(order, harmonic)
     particles_to_moments = operations.particles_to_moments
     sums_to_moments = operations.sums_to_moments
     moments_to_moments = operations.moments_to_moments
 
-    @jit
-    def moments_of_leaf(tree: Tree, cell: Any, place: Any, sums: Any) -> None:
+    @jit(flags=EXACT, numba=False)
+    def moments_of_leaf(
+        tree: Tree, cell: Any, relative: bool, place: Any, ascending: Any, sums: Any
+    ) -> None:
         start, end = tree.cells[cell, START], tree.cells[cell, END]
-        body = tree.bodies[cell]
-        scale = 1.0 / cell_unit(body[RADIUS])
+        body, near, kind = tree.bodies[cell], tree.near, tree.near.dtype.type
+        scale, zero = kind(1.0 / cell_unit(body[RADIUS])), kind(0)
         sums[:] = 0
         for first in range(start, end, LANES):
-            for lane in range(LANES):
-                i = min(first + lane, end - 1)
-                place[0, lane] = (body[X] - tree.place[0, i]) * scale
-                place[1, lane] = (body[Y] - tree.place[1, i]) * scale
-                place[2, lane] = (body[Z] - tree.place[2, i]) * scale
-                place[3, lane] = tree.place[3, i] if first + lane < end else 0.0
+            inside = read(ascending, 0) < np.int32(end - first)
+            for axis in range(3):
+                center = kind(0.0 if relative else body[axis])
+                away = (center - read(near[axis], first)) * scale
+                write(place[axis], 0, choose(inside, away, zero))
+            write(place[3], 0, choose(inside, read(near[3], first), zero))
             particles_to_moments(place, sums)
         sums_to_moments(sums, tree.moments[cell])
 
-    @jit
+    @jit(flags=EXACT, numba=False)
     def moments_of_parent(tree: Tree, cell: Any, place: Any, chosen: Any) -> None:
         bodies = tree.bodies
         first, number = tree.cells[cell, FIRST], tree.cells[cell, NUMBER]
@@ -250,8 +253,10 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
                 place[4, lane] = cell_unit(bodies[child, RADIUS]) * scale
         moments_to_moments(place, chosen, tree.moments, tree.moments[cell])
 
-    @jit
-    def fill(tree: Tree, ranges: Any, relative: bool, place: Any, chosen: Any, sums: Any) -> None:
+    @jit(flags=EXACT, numba=False)
+    def fill(
+        tree: Tree, ranges: Any, relative: bool, place: Any, chosen: Any, ascending: Any, sums: Any
+    ) -> None:
         for some in range(ranges.shape[0]):
             first, last = ranges[some, 0], ranges[some, 1]
             for back in range(last - first):
@@ -262,7 +267,7 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
                     _approach(tree, cell, relative)
                 if tree.moments.shape[0] > 0:
                     if is_leaf:
-                        moments_of_leaf(tree, cell, place, sums)
+                        moments_of_leaf(tree, cell, relative, place, ascending, sums)
                     else:
                         moments_of_parent(tree, cell, place, chosen)
                     # Single precision would lose digits of the sum of many equal masses.
@@ -337,15 +342,15 @@ def summarize(tree: Tree, order: int, harmonic: bool, real: type, sources: bool)
     balls: NDArray[Any] = np.empty((len(tree.cells) + LANES, 8), real)
     balls[-LANES:] = NOTHING
     moments: NDArray[Any] = np.zeros((count, padded(operations.basis)), real)
+    ascending = np.arange(LANES, dtype=np.int32)
     tree = tree._replace(moments=moments, near=near, balls=balls)
 
     def cells(ranges: list[tuple[int, int]]) -> None:
         place: NDArray[Any] = np.ones((5, LANES), real)
         sums: NDArray[Any] = np.empty((operations.every, LANES), real)
         chosen = np.zeros(LANES, np.int32)
-        fill(
-            tree, np.array(ranges, np.int64).reshape(-1, 2), real is np.float32, place, chosen, sums
-        )
+        given = np.array(ranges, np.int64).reshape(-1, 2)
+        fill(tree, given, real is np.float32, place, chosen, ascending, sums)
 
     tasks = np.array_split(branches, min(len(branches), TASKS))
     ends = {cell: (int(tree.cells[cell, FIRST]), _end(tree, cell)) for cell in branches}

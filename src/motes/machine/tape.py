@@ -8,25 +8,21 @@ loop of their own that forms TOGETHER of them in registers.
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from llvmlite import ir
-from numba.core import cgutils
-
-from motes.interact.gravity import lanes as simd
-from motes.interact.gravity.lanes import LANES
+from motes.machine.block import literal
+from motes.machine.kinds import INT, INT32, Number
+from motes.machine.values import Scalar
 
 ROOM = 4096
 """Most lanes that a formula may keep."""
 
 TOGETHER = 4
 """Sums that are formed in registers together, as one would wait for its own last term."""
-
-LONG = ir.IntType(64)
-SHORT = ir.IntType(32)
 
 
 class Note:
@@ -69,10 +65,9 @@ class Note:
 class Tape:
     """A formula that is being noted, and then played."""
 
-    def __init__(self, builder: Any, element: Any, wire: Callable[..., Any]) -> None:
-        self.builder, self.wire = builder, wire
-        self.lanes = ir.VectorType(element, LANES)
-        self.memory = cgutils.alloca_once(builder, ir.ArrayType(self.lanes, ROOM))
+    def __init__(self, writer: Any, lanes: Number, wire: Callable[..., Any]) -> None:
+        self.writer, self.lanes, self.wire = writer, lanes, wire
+        self.memory = writer.room(lanes.over(1), ROOM * lanes.lanes)
         self.notes: list[Note] = []
         self.constants: dict[float, Note] = {}
         self.place: dict[Note, int] = {}
@@ -85,7 +80,7 @@ class Tape:
         if isinstance(value, Note):
             return value
         if value not in self.constants:
-            lanes = self.wire(self.builder, simd.constant(self.lanes.element, value))
+            lanes = self.wire(self.writer, literal(value, self.lanes))
             self.constants[value] = self.given(lambda: lanes)
         return self.constants[value]
 
@@ -103,13 +98,11 @@ class Tape:
 
     def write(self, place: Any, wire: Any) -> None:
         """Put lanes, or a number for each of them, into memory."""
-        wide = isinstance(wire.value.type, ir.VectorType)
-        lanes = wire.value if wide else simd.splat(self.builder, wire.value)
-        self.builder.store(lanes, self._pointer(place))
+        self._store(self.writer.cast(wire.value, self.lanes).text, place)
 
     def read(self, place: Any) -> Any:
         """Lanes from memory."""
-        return self.wire(self.builder, self.builder.load(self._pointer(place)))
+        return self.wire(self.writer, Scalar(self.lanes, self._load(place)))
 
     def sums(self, sums: list[list[tuple[Any, Any]]]) -> list[Note]:
         """Sums of products."""
@@ -118,10 +111,17 @@ class Tape:
             for pairs in sums
         ]
 
-    def each(self, count: int, step: int, body: Callable[[Any], None]) -> None:
+    def each(self, count: int, step: int, body: Callable[[str], None]) -> None:
         """Code of a loop of `count` rounds, whose body is given 0, step, 2 step ..."""
-        with cgutils.for_range(self.builder, ir.Constant(LONG, count)) as loop:
-            body(self.builder.mul(loop.index, ir.Constant(LONG, step)))
+        self.writer.counted(str(count), lambda index: body(self.times(index.text, step)))
+
+    def times(self, number: str, factor: int) -> str:
+        """A product of integers in registers."""
+        return str(self.writer.do(f"mul nsw i64 {number}, {factor}"))
+
+    def plus(self, number: str, more: Any) -> str:
+        """A sum of integers in registers."""
+        return str(self.writer.do(f"add nsw i64 {number}, {more}"))
 
     def keep(self, notes: list[Note], use: Callable[[int], None]) -> None:
         """Have some lanes end to end once the tape has been played; `use` is told where."""
@@ -180,9 +180,9 @@ class Tape:
     def _loop(self, steps: list[tuple[int, ...]]) -> None:
         table = self._table([place for step in steps for place in step])
 
-        def step(first: Any) -> None:
-            d, a, b, c = (self._pointer(self._entry(table, first, k)) for k in range(4))
-            self.builder.store(self._fused(*map(self.builder.load, (a, b, c))), d)
+        def step(first: str) -> None:
+            d, a, b, c = (self._entry(table, first, k) for k in range(4))
+            self._store(self._fused(*(self._load(place) for place in (a, b, c))), d)
 
         self.each(len(steps), 4, step)
 
@@ -206,51 +206,58 @@ class Tape:
         for k in range(-len(sums) % TOGETHER):  # Places for sums of nothing.
             self.place[Note(self, "given", None)] = begin + len(sums) + k
         table, ranges = self._table(places), self._table(groups)
-        builder = self.builder
-        totals = [cgutils.alloca_once(builder, self.lanes) for _ in range(TOGETHER)]
+        writer, kind = self.writer, self.lanes.llvm
+        totals = [writer.room(self.lanes.over(1), self.lanes.lanes) for _ in range(TOGETHER)]
+        align = f"align {self.lanes.bytes}"
 
-        def group(number: Any) -> None:
+        def group(number: str) -> None:
             for total in totals:
-                builder.store(ir.Constant(self.lanes, None), total)
-            start, count = (builder.zext(self._entry(ranges, number, k), LONG) for k in (0, 1))
-            with cgutils.for_range(builder, count) as loop:
-                row = builder.mul(builder.add(start, loop.index), ir.Constant(LONG, 2 * TOGETHER))
+                writer.line(f"store {kind} zeroinitializer, ptr {total}, {align}")
+            start, count = (self._entry(ranges, number, k) for k in (0, 1))
+
+            def round(index: Any) -> None:
+                row = self.times(self.plus(start, index.text), 2 * TOGETHER)
                 for k, total in enumerate(totals):
-                    a, b = (
-                        builder.load(self._pointer(self._entry(table, row, 2 * k + side)))
-                        for side in (0, 1)
-                    )
-                    builder.store(self._fused(a, b, builder.load(total)), total)
+                    a, b = (self._load(self._entry(table, row, 2 * k + s)) for s in (0, 1))
+                    old = writer.do(f"load {kind}, ptr {total}, {align}")
+                    writer.line(f"store {kind} {self._fused(a, b, old)}, ptr {total}, {align}")
+
+            writer.counted(count, round)
             for k, total in enumerate(totals):
-                place = builder.add(
-                    builder.mul(number, ir.Constant(LONG, TOGETHER // 2)),
-                    ir.Constant(LONG, begin + k),
-                )
-                builder.store(builder.load(total), self._pointer(place))
+                place = self.plus(self.times(number, TOGETHER // 2), begin + k)
+                self._store(writer.do(f"load {kind}, ptr {total}, {align}"), place)
 
         self.each(len(groups) // 2, 2, group)
 
-    def _fused(self, a: Any, b: Any, c: Any) -> Any:
-        flags = ("contract",)
-        return self.builder.fadd(self.builder.fmul(a, b, flags=flags), c, flags=flags)
+    def _fused(self, a: str, b: str, c: str) -> str:
+        kind = self.lanes.llvm
+        product = self.writer.do(f"fmul contract {kind} {a}, {b}")
+        return str(self.writer.do(f"fadd contract {kind} {product}, {c}"))
 
-    def _table(self, numbers: list[int]) -> Any:
+    def _table(self, numbers: list[int]) -> str:
         """A list of numbers beside the code."""
-        module, kind = self.builder.module, ir.ArrayType(SHORT, len(numbers))
-        table = cgutils.add_global_variable(module, kind, module.get_unique_name("tape"))
-        table.initializer = ir.Constant(kind, numbers)
-        table.global_constant, table.linkage = True, "internal"
-        return table
+        kind = f"[{len(numbers)} x i32]"
+        content = f"{kind} [{', '.join(f'i32 {n}' for n in numbers)}]" if numbers else f"{kind} []"
+        name = f"@tape_{hashlib.sha256(content.encode()).hexdigest()[:24]}"
+        self.writer.declare(f"{name} = internal constant {content}")
+        return name
 
-    def _entry(self, table: Any, first: Any, k: int) -> Any:
-        place = self.builder.add(first, ir.Constant(LONG, k))
-        return self.builder.load(self.builder.gep(table, [ir.Constant(LONG, 0), place]))
+    def _entry(self, table: str, first: str, k: int) -> str:
+        at = self.plus(first, k)
+        at = self.writer.do(f"getelementptr inbounds i32, ptr {table}, i64 {at}")
+        number = Scalar(INT32, self.writer.do(f"load i32, ptr {at}"))
+        return str(self.writer.cast(number, INT).text)
 
-    def _pointer(self, place: Any) -> Any:
-        where = ir.Constant(LONG, place) if isinstance(place, int) else place
-        if where.type == SHORT:
-            where = self.builder.zext(where, LONG)
-        return self.builder.gep(self.memory, [ir.Constant(LONG, 0), where])
+    def _pointer(self, place: Any) -> str:
+        kind = self.lanes.llvm
+        at = self.writer.do(f"getelementptr inbounds {kind}, ptr {self.memory}, i64 {place}")
+        return f"ptr {at}, align {self.lanes.bytes}"
+
+    def _load(self, place: Any) -> str:
+        return str(self.writer.do(f"load {self.lanes.llvm}, {self._pointer(place)}"))
+
+    def _store(self, text: str, place: Any) -> None:
+        self.writer.line(f"store {self.lanes.llvm} {text}, {self._pointer(place)}")
 
 
 class Array:
@@ -275,7 +282,7 @@ class Array:
         place = tape.place[notes[0]]
 
         def read(k: Any) -> None:
-            tape.write(tape.builder.add(k, ir.Constant(LONG, place)), self.array[k])
+            tape.write(tape.plus(k, place), self.array[k])
 
         tape.first.append(lambda: tape.each(count, 1, read))
         return notes
@@ -286,7 +293,7 @@ class Array:
 
         def use(place: int) -> None:
             def row(k: Any) -> None:
-                found = tape.read(tape.builder.add(k, ir.Constant(LONG, place)))
+                found = tape.read(tape.plus(k, place))
                 self.array[k] = change(found)
 
             tape.each(len(notes), 1, row)
@@ -310,7 +317,7 @@ class Array:
 
             def part(first: Any) -> None:
                 for k, wire in enumerate(some(first)):
-                    tape.write(tape.builder.add(first, ir.Constant(LONG, place + k)), wire)
+                    tape.write(tape.plus(first, place + k), wire)
 
             tape.each(whole // step, step, part)
 
@@ -318,18 +325,18 @@ class Array:
         return notes[:count]
 
     def scattered(self, notes: Any, scatter: Callable[..., None]) -> None:
-        """Write columns of a table; `scatter` makes the code for LANES of them."""
+        """Write columns of a table; `scatter` makes the code for tape.lanes.lanes of them."""
         tape = self.tape
-        whole = [*notes, *[notes[-1]] * (-len(notes) % LANES)]
+        whole = [*notes, *[notes[-1]] * (-len(notes) % tape.lanes.lanes)]
 
         def use(place: int) -> None:
             def block(first: Any) -> None:
                 some = [
-                    tape.read(tape.builder.add(first, ir.Constant(LONG, place + k)))
-                    for k in range(LANES)
+                    tape.read(tape.plus(first, place + k))
+                    for k in range(tape.lanes.lanes)
                 ]
                 scatter(self.array, some, first)
 
-            tape.each(len(whole) // LANES, LANES, block)
+            tape.each(len(whole) // tape.lanes.lanes, tape.lanes.lanes, block)
 
         tape.keep(whole, use)
