@@ -14,7 +14,6 @@ import numpy as np
 
 from motes.machine.block import literal
 from motes.machine.kinds import INT, INT32, Number, Unsupported
-from motes.machine.tape import Array, Note, Tape
 from motes.machine.target import widest
 from motes.machine.values import Group, Known, Scalar, Value, View, Written
 
@@ -36,8 +35,8 @@ class Traced(Written):
     formula returns, lanes or a tuple of them, the operation returns.
     """
 
-    def __init__(self, formula: Callable[..., Any], looped: bool = False) -> None:
-        self.formula, self.looped = formula, looped
+    def __init__(self, formula: Callable[..., Any]) -> None:
+        self.formula = formula
         self.__name__ = formula.__name__
 
     def __call__(self, *arguments: Any) -> Any:
@@ -48,21 +47,15 @@ class Traced(Written):
     def write(self, writer: Any, values: Sequence[Value]) -> Value:
         """The operation's code, for arguments in registers."""
         given = [_wire(writer, value) for value in values]
-        if self.looped:
-            kind = next(value.type.item for value in values if isinstance(value, View))
-            tape = Tape(writer, kind.over(LANES), Wire)
-            self.formula(*(_noted(tape, value) for value in given))
-            tape.play()
-            return Known(None)
         found = self.formula(*given)
         if isinstance(found, tuple):
             return Group(tuple(wire.value for wire in found))
         return Known(None) if found is None else found.value  # type: ignore[no-any-return]
 
 
-def traced(formula: Callable[..., Any], looped: bool = False) -> Callable[..., Any]:
-    """A formula as an operation; `looped`: with code that is a loop over multiply-adds."""
-    return Traced(formula, looped)
+def traced(formula: Callable[..., Any]) -> Callable[..., Any]:
+    """A formula as an operation."""
+    return Traced(formula)
 
 
 class Wire:
@@ -167,17 +160,8 @@ def _wire(writer: Any, value: Value) -> Any:
     return writer.cast(value, INT).text if value.type.whole else Wire(writer, value)
 
 
-def _noted(tape: Tape, value: Any) -> Any:
-    if isinstance(value, Wire):
-        return tape.given(lambda: value)
-    return Array(tape, value) if isinstance(value, _Array) else value
-
-
 def inverse_root(lanes: Any) -> Any:
     """1 / root of each lane."""
-    if isinstance(lanes, Note):
-        root = inverse_root(lanes.straight())
-        return lanes.tape.given(lambda: root)
     if not isinstance(lanes, Wire):
         return lanes.dtype.type(1) / np.sqrt(lanes)
     root = Wire(lanes.writer, lanes.writer.intrinsic("sqrt", lanes.value))
@@ -186,8 +170,6 @@ def inverse_root(lanes: Any) -> Any:
 
 def ones(like: Any) -> Any:
     """1 in each lane."""
-    if isinstance(like, Note):
-        return like.tape.note(1.0)
     if not isinstance(like, Wire):
         return np.ones_like(like)
     return Wire(like.writer, literal(1.0, like.value.type))
@@ -195,25 +177,18 @@ def ones(like: Any) -> Any:
 
 def rows(array: Any, count: int) -> list[Any]:
     """The first `count` rows of an array, or its numbers."""
-    return array.rows(count) if isinstance(array, Array) else [array[k] for k in range(count)]
+    return [array[k] for k in range(count)]
 
 
 def write(array: Any, values: list[Any]) -> None:
     """Write lanes to the first rows of an array."""
-    _write(array, values, lambda lanes: lanes)
+    for k, value in enumerate(values):
+        array[k] = value
 
 
 def write_totals(array: Any, values: list[Any]) -> None:
     """Write the sums over lanes to the first numbers of an array."""
-    _write(array, values, total)
-
-
-def _write(array: Any, values: list[Any], change: Callable[[Any], Any]) -> None:
-    if isinstance(array, Array):
-        array.write(values, change)
-    else:
-        for k, value in enumerate(values):
-            array[k] = change(value)
+    write(array, [total(value) for value in values])
 
 
 def total(lanes: Any) -> Any:
@@ -225,15 +200,13 @@ def total(lanes: Any) -> Any:
 
 def gathered(table: Any, chosen: Any, count: int) -> Sequence[Any]:
     """The first `count` columns of a table, lane k from row chosen[k]; its width fills PARTs."""
-    if isinstance(table, Array):
-        return table.gathered(chosen, count, PART, gathering)
     if not isinstance(table, _Array):
         return [table[chosen[:LANES], column].copy() for column in range(count)]
     part = gathering(table, chosen)
-    return [column for first in range(0, count, PART) for column in part(str(first))][:count]
+    return [column for first in range(0, count, PART) for column in part(first)][:count]
 
 
-def gathering(table: Any, chosen: Any) -> Callable[[str], list[Wire]]:
+def gathering(table: Any, chosen: Any) -> Callable[[int], list[Wire]]:
     """Function that gathers PART columns of a table, from a given one on."""
     writer, small = table.writer, table.item.over(PART)
     starts = []
@@ -241,7 +214,7 @@ def gathering(table: Any, chosen: Any) -> Callable[[str], list[Wire]]:
         number = writer.cast(chosen.lanes(str(lane), INT32), INT)
         starts.append(table.row(number.text))
 
-    def columns(first: str) -> list[Wire]:
+    def columns(first: int) -> list[Wire]:
         parts = [table.lanes(place(writer, start, first), small) for start in starts]
         # Parts k, k + 4, k + 8 ... end to end; then columns, in each part apart from the others.
         a, b, c, d = (_joined(writer, parts[k::PART]) for k in range(PART))
@@ -280,19 +253,16 @@ def _by_parts(writer: Any, a: Scalar, b: Scalar, places: tuple[int, ...]) -> Sca
 
 def scattered(columns: Sequence[Any], table: Any, first: Any) -> None:
     """Write lane k of all columns to row `first` + k of a table, whose width fills lanes."""
-    if isinstance(table, Array):
-        table.scattered(columns, lambda array, some, begin: scatter(some, array, first, begin))
-        return
     if not isinstance(table, _Array):
         for column, values in enumerate(columns):
             table[first : first + LANES, column] = values
         return
     whole = [*columns, *[columns[-1]] * (-len(columns) % LANES)]
     for begin in range(0, len(whole), LANES):
-        scatter(whole[begin : begin + LANES], table, first, str(begin))
+        scatter(whole[begin : begin + LANES], table, first, begin)
 
 
-def scatter(columns: Sequence[Any], table: Any, first: str, begin: str) -> None:
+def scatter(columns: Sequence[Any], table: Any, first: str, begin: int) -> None:
     """Write LANES columns to a table, from column `begin` on."""
     writer = table.writer
     for lane, row in enumerate(_transposed(writer, [column.value for column in columns])):

@@ -7,8 +7,14 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from motes.jit import EXACT, jit
+from motes.machine.lanes import choose
 from motes.machine.traced import gathered, traced
+
+LEAST = np.float32(0.1)
+"""Square of the smallest ratio of radii that makes a difference."""
 
 
 @traced
@@ -31,9 +37,11 @@ def acceptance(order: int, low: int) -> Callable[..., Any]:
 
     (balls, chosen, own, stricter, opening2, reach, e2) -> lanes: whether the rows `chosen` of
     `balls` are far from the ball `own`, whether they are for the lower order, and their radii. The
-    error of the acceleration is about M / R^2 q^p / (1 - q^2)^2 with q = (r_A + r_B) / R, the sum
-    of the terms that are left out; `stricter` is one over the error that is allowed, for both
-    orders. q^2 is below `opening2`, the balls are more than `reach` apart, and e2 is added to R^2.
+    error of the acceleration is about M / R^2 q^p / (1 - q^2) with q = (r_A + r_B) / R, the sum of
+    the terms that are left out. Cells smaller than the target come in crowds, and errors that the
+    target's radius makes are alike for a crowd: M then stands for M (r_A / r_B)^4, less where r_B
+    is tiny. `stricter` is one over the error that is allowed, for both orders. q^2 is below
+    `opening2`, the balls are more than `reach` apart, and e2 is added to R^2.
     """
 
     @jit(inline=True, flags=EXACT)
@@ -47,12 +55,13 @@ def acceptance(order: int, low: int) -> Callable[..., Any]:
         inverse = 1 / r2
         q2 = square * inverse
         rest = 1 - q2
-        rest2 = rest * rest
-        allowed = rest2 * rest2
-        pull = mass * inverse
+        own2 = own[6] * own[6]
+        smaller = own2 / (radius * radius + own2 * LEAST)
+        pull = mass * inverse * choose(smaller > 1, smaller * smaller, 1)
+        allowed = rest * rest
         first, second = pull * stricter[0], pull * stricter[1]
-        open_ = (r2 > gap * gap) & (square < opening2 * r2)
-        far = open_ & (first * first * q2**order < allowed)
+        apart = (r2 > gap * gap) & (square < opening2 * r2)
+        far = apart & (first * first * q2**order < allowed)
         easy = far & (second * second * q2**low < allowed)
         return far, easy, radius
 

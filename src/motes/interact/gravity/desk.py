@@ -23,8 +23,8 @@ class Limits(NamedTuple):
     opening2: float
     """Square of the largest (r_A + r_B) / R at which expansions are used."""
     error: float
-    """Largest estimated error of the acceleration by one use of an expansion for one particle; for
-    a cell of N it is less by the root of N, as stricter limits of large cells cost little."""
+    """Largest estimated error of the acceleration by one use of an expansion for a leaf; for
+    cells of more particles it falls with the root of their number, as that costs little."""
     easier: float
     """How many times less may be neglected where the lower order is used."""
     force: float

@@ -38,10 +38,10 @@ SINGLE_FROM = 4e-6
 LEAVES = 16
 """Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
-LEAVES_OF_A_CLASS = 4
+LEAVES_OF_A_CLASS = 6
 """Target leaves out of each further class, which has twice as many as the one before."""
 
-SAFETY = 0.7
+SAFETY = 0.85
 """Part of the tolerance that the error on the sample may use."""
 
 GROWTH = 3.0
@@ -51,7 +51,7 @@ tolerance, as errors of many expansions cancel and the estimate is an upper boun
 ENOUGH = 5.0
 """How much less it must neglect at least, or it is made again."""
 
-EASIER = 2.0
+EASIER = 8.0
 """How many times less an expansion of the lower order may neglect: there are many of them."""
 
 TRIALS = 8
@@ -60,7 +60,7 @@ TRIALS = 8
 TASKS, FEWEST_TASKS, PARTICLES_OF_A_TASK = 128, 8, 2048
 """Parts of the walk; each of the threads takes one after the other. A part costs 0.1 ms more."""
 
-STRICTER = 20.0
+STRICTER = 10.0
 """How much less the walk that the sample is compared with may neglect."""
 
 HIGHEST = {True: 12, False: 8}
@@ -87,7 +87,7 @@ def plan(tolerance: float, law: str) -> Plan:
     """Order, leaf size and precision that are fast at a tolerance, found by measurement."""
     digits = -math.log10(tolerance)
     real = np.float32 if tolerance >= SINGLE_FROM else np.float64
-    order = min(max(2, int(1.2 * digits + 1.5)), HIGHEST[law != "plummer"])
+    order = min(max(2, int(1.3 * digits + 1.5)), HIGHEST[law != "plummer"])
     return Plan(order, max(order - 2, 1), leaf=32 if digits < 4 else 48, real=real)
 
 
@@ -169,7 +169,7 @@ class Problem:
         pulled = a * self.targets.place[3, sample.rows]
         force = sample.mean_of_most(pulled) * self.targets.place.shape[1] or math.inf
         rounding = tolerance * scale
-        share, strictest = 4.0 * tolerance * GROWTH ** (self.plan.order - 2), math.inf
+        share, strictest = tolerance * GROWTH ** (self.plan.order - 2), math.inf
         kept = None
         for _ in range(TRIALS):
             # A sun's momentum hangs on single expansions, whose errors do not cancel.
@@ -177,7 +177,7 @@ class Problem:
             if share < ENOUGH * strictest:
                 strictest = share / STRICTER
                 strict = limits._replace(
-                    opening2=limits.opening2 / 4,
+                    opening2=limits.opening2 / 2,
                     error=strictest * scale,
                     force=limits.force / STRICTER,
                     rounding=rounding / STRICTER,
@@ -185,7 +185,7 @@ class Problem:
                 exact = self._at(sample, strict)
             part = self._error(sample, self._at(sample, limits), exact) / (SAFETY * tolerance)
             if part <= 1.0:
-                if kept is not None or part > 0.6:
+                if kept is not None or part > 0.75:
                     return limits
                 kept = limits
             elif kept is not None:

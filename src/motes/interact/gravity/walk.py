@@ -38,6 +38,9 @@ from motes.interact.gravity.tree import (
 from motes.jit import EXACT, jit
 from motes.machine.lanes import bits, lowest, put_some
 
+FULL = 16.0
+"""Particles of a usual leaf, for which the limit of the error holds as it is."""
+
 
 @cache
 def walker(law: str, real: type, potential: bool, order: int, low_order: int) -> Callable[..., Any]:
@@ -87,7 +90,7 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
         radius, e2 = own[BALL_RADIUS], real(limits.e2)
         count = targets.cells[cell, END] - targets.cells[cell, START]
         is_leaf = targets.cells[cell, NUMBER] == 0
-        error = limits.error / math.sqrt(float(count))
+        error = limits.error / math.sqrt(max(count, FULL) / FULL)
         allowed = min(error, limits.force / max(targets.bodies[cell, MASS], 1e-300))
         stricter = real(1.0 / allowed), real(limits.easier / allowed)
         few = np.int32(limits.few // count)
