@@ -207,14 +207,16 @@ def _masses(values: ArrayLike, count: int) -> NDArray[np.float64]:
             f"m must have the shape ({count},), one mass per row of x, not {mass.shape}."
         )
     _check_finite(mass, "m")
-    if (mass < 0).any():
+    if mass.size and mass.min() < 0:
         i = int(np.argmax(mass < 0))
         raise ValueError(f"m[{i}] = {mass[i]:g}; masses must be at least 0.")
     return mass
 
 
 def _check_finite(values: NDArray[Any], name: str) -> None:
-    if not np.isfinite(values).all():
+    with np.errstate(all="ignore"):
+        doubtful = not np.isfinite(values.sum())
+    if doubtful and not np.isfinite(values).all():
         i = tuple(int(k) for k in np.argwhere(~np.isfinite(values))[0])
         place = ", ".join(str(k) for k in i)
         raise ValueError(f"{name}[{place}] = {values[i]}; all values must be finite.")

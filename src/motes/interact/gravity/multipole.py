@@ -196,7 +196,7 @@ class Problem:
     def solve(self, limits: Limits) -> NDArray[Any]:
         """Sums (4, k) at all targets, in the order of the tree."""
         n = self.targets.place.shape[1]
-        branches = self.targets.cells[divide_work(self.targets)[0], :2]
+        branches = self.targets.cells[divide_work(self.targets)[0][:, 0], :2]
         tasks = min(TASKS, max(n // PARTICLES_OF_A_TASK, FEWEST_TASKS))
         cuts = np.arange(tasks) * n / tasks
         first = np.unique(np.searchsorted(branches[:, START], cuts))
@@ -206,11 +206,11 @@ class Problem:
 
     def unsorted(self, sums: NDArray[Any]) -> NDArray[np.float64]:
         """Sums in the order in which the targets came."""
-        result = np.empty(sums.shape)
+        result = np.empty(sums.shape[::-1])
         order, ranges = self.targets.order, blocks(sums.shape[1], 1 << 16)
 
         share(lambda k: unpermute(sums, order, result, *ranges[k]), len(ranges))
-        return result
+        return result.T
 
     def _walk(self, ranges: NDArray[np.int64], tasks: int, limits: Limits) -> NDArray[Any]:
         """Sums at the targets in some ranges (k, 2) of rows, whole leaves, in a number of tasks."""
@@ -238,7 +238,8 @@ class Problem:
         """Leaves in classes by radius, as the largest errors are those of few large leaves."""
         cells = self.targets.cells
         leaves = np.flatnonzero(cells[:, NUMBER] == 0)
-        leaves = leaves[np.argsort(-self.targets.bodies[leaves, RADIUS], kind="stable")]
+        borders = [LEAVES << k for k in range(32) if LEAVES << k < len(leaves)]
+        leaves = leaves[np.argpartition(-self.targets.bodies[leaves, RADIUS], borders)]
         counts = cells[leaves, END] - cells[leaves, START]
         chosen, weights, first, last = [np.arange(0)], [np.ones(0)], 0, LEAVES
         while first < len(leaves):

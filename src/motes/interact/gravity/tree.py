@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.interact.gravity.lanes import LANES, read, write
+from motes.interact.gravity.lanes import LANES, maximum, read, spread, write
 from motes.interact.gravity.morton import LEVELS, morton_order
 from motes.interact.gravity.translations import padded, translations
 from motes.jit import EXACT, blocks, jit, share
-from motes.machine.lanes import choose
+from motes.machine.lanes import choose, largest
 
 START, END, FIRST, NUMBER = 0, 1, 2, 3
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
@@ -146,10 +146,11 @@ def _permute(
 
 @jit(numba=False)
 def unpermute(sums: Any, order: Any, result: Any, first: Any, last: Any) -> None:
-    """Write columns `first` to `last` of sums in the tree's order to where they came from."""
-    for row in range(sums.shape[0]):
-        for i in range(first, last):
-            result[row, order[i]] = sums[row, i]
+    """Write columns `first` to `last` of sums in the tree's order to rows where they came from."""
+    for i in range(first, last):
+        place = order[i]
+        for row in range(sums.shape[0]):
+            result[place, row] = sums[row, i]
 
 
 @jit(numba=False)
@@ -178,10 +179,15 @@ def _measure(tree: Tree, cell: Any) -> None:
     weights += mass
     x, y, z = x / weights, y / weights, z / weights
     xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
-    r2 = 0.0
-    for i in range(xs.size):
+    whole = xs.size // LANES * LANES
+    most, r2 = spread(0.0), 0.0
+    for i in range(0, whole, LANES):
+        dx, dy, dz = read(xs, i) - x, read(ys, i) - y, read(zs, i) - z
+        most = maximum(dx * dx + dy * dy + dz * dz, most)
+    for i in range(whole, xs.size):
         dx, dy, dz = xs[i] - x, ys[i] - y, zs[i] - z
         r2 = max(r2, dx * dx + dy * dy + dz * dz)
+    r2 = max(r2, largest(most))
     bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
     bodies[cell, RADIUS], bodies[cell, MASS] = np.sqrt(r2), mass
     ball = tree.balls[cell]
@@ -341,32 +347,30 @@ def summarize(tree: Tree, order: int, harmonic: bool, real: type, sources: bool)
     near[:, -LANES:] = 0
     balls: NDArray[Any] = np.empty((len(tree.cells) + LANES, 8), real)
     balls[-LANES:] = NOTHING
-    moments: NDArray[Any] = np.zeros((count, padded(operations.basis)), real)
+    moments: NDArray[Any] = np.empty((count, padded(operations.basis)), real)
+    moments[-1:] = 0  # Of rows that lanes which are left over are about.
     ascending = np.arange(LANES, dtype=np.int32)
     tree = tree._replace(moments=moments, near=near, balls=balls)
 
-    def cells(ranges: list[tuple[int, int]]) -> None:
+    def cells(ranges: Any) -> None:
         place: NDArray[Any] = np.ones((5, LANES), real)
         sums: NDArray[Any] = np.empty((operations.every, LANES), real)
         chosen = np.zeros(LANES, np.int32)
-        given = np.array(ranges, np.int64).reshape(-1, 2)
+        given = np.asarray(ranges, np.int64).reshape(-1, 2)
         fill(tree, given, real is np.float32, place, chosen, ascending, sums)
 
     tasks = np.array_split(branches, min(len(branches), TASKS))
-    ends = {cell: (int(tree.cells[cell, FIRST]), _end(tree, cell)) for cell in branches}
 
     def branch(k: int) -> None:
-        cells([r for cell in tasks[k] for r in (ends[int(cell)], (int(cell), int(cell) + 1))])
+        some = tasks[k]
+        ranges = np.empty((len(some), 2, 2), np.int64)
+        ranges[:, 0, 0], ranges[:, 0, 1] = tree.cells[some[:, 0], FIRST], some[:, 1]
+        ranges[:, 1, 0], ranges[:, 1, 1] = some[:, 0], some[:, 0] + 1
+        cells(ranges)
 
     share(branch, len(tasks))
-    cells([(cell, cell + 1) for cell in reversed(stem)])
+    cells([(cell, cell + 1) for cell in stem[::-1]])
     return tree
-
-
-def _end(tree: Tree, cell: int) -> int:
-    """The row after a cell's last descendant."""
-    first, number = (int(k) for k in tree.cells[cell, [FIRST, NUMBER]])
-    return _end(tree, first + number - 1) if number else first
 
 
 def largest_leaf(tree: Tree) -> int:
@@ -376,17 +380,36 @@ def largest_leaf(tree: Tree) -> int:
     return int((cells[leaves, END] - cells[leaves, START]).max())
 
 
-def divide_work(tree: Tree) -> tuple[list[int], list[int]]:
-    """Cells whose descendants are one task each, and the cells above them."""
-    n = tree.place.shape[1]
-    limit = min(max(n // 64, 64), 8192)
-    branches, stem, waiting = [], [], [0]
-    while waiting:
-        cell = waiting.pop()
-        start, end, first, number = (int(v) for v in tree.cells[cell])
-        if end - start <= limit or not number:
-            branches.append(cell)
+def divide_work(tree: Tree) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Cells whose descendants are one task each, (k, 2) with the row after the last of these; and
+    the cells above them, each before its children."""
+    limit = min(max(tree.place.shape[1] // 64, 64), 8192)
+    branches = np.empty((len(tree.cells), 2), np.int64)
+    stem = np.empty(len(tree.cells), np.int64)
+    found, above = _divide_work(tree.cells, limit, branches, stem)
+    return branches[:found], stem[:above]
+
+
+@jit(numba=False)
+def _divide_work(cells: Any, limit: Any, branches: Any, stem: Any) -> Any:
+    waiting = np.empty(8 * LEVELS + 1, np.int64)
+    waiting[0] = 0
+    depth, found, above = 1, 0, 0
+    while depth > 0:
+        depth -= 1
+        cell = waiting[depth]
+        start, end, first, number = cells[cell]
+        # What comes next in this order has its descendants after those of the last branch.
+        if found > 0 and branches[found - 1, 1] == 0:
+            branches[found - 1, 1] = first
+        if end - start <= limit or number == 0:
+            branches[found, 0], branches[found, 1] = cell, 0
+            found += 1
         else:
-            stem.append(cell)
-            waiting += reversed(range(first, first + number))
-    return branches, stem
+            stem[above] = cell
+            above += 1
+            for back in range(number):
+                waiting[depth] = first + number - 1 - back
+                depth += 1
+    branches[found - 1, 1] = cells.shape[0]
+    return found, above
