@@ -50,7 +50,7 @@ class Traced(Written):
         found = self.formula(*given)
         if isinstance(found, tuple):
             return Group(tuple(wire.value for wire in found))
-        return Known(None) if found is None else found.value  # type: ignore[no-any-return]
+        return Known(None) if found is None else found.value
 
 
 def traced(formula: Callable[..., Any]) -> Callable[..., Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -65,4 +66,7 @@ def acceptance(order: int, low: int) -> Callable[..., Any]:
         easy = far & (second * second * q2**low < allowed)
         return far, easy, radius
 
+    if isinstance(is_far, FunctionType):
+        # Plain Python: as in machine code, what overflows or is 0 / 0 is no fault, and not far.
+        return np.errstate(all="ignore")(is_far)
     return is_far  # type: ignore[no-any-return]

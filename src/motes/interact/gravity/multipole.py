@@ -239,7 +239,8 @@ class Problem:
         cells = self.targets.cells
         leaves = np.flatnonzero(cells[:, NUMBER] == 0)
         borders = [LEAVES << k for k in range(32) if LEAVES << k < len(leaves)]
-        leaves = leaves[np.argpartition(-self.targets.bodies[leaves, RADIUS], borders)]
+        if borders:
+            leaves = leaves[np.argpartition(-self.targets.bodies[leaves, RADIUS], borders)]
         counts = cells[leaves, END] - cells[leaves, START]
         chosen, weights, first, last = [np.arange(0)], [np.ones(0)], 0, LEAVES
         while first < len(leaves):

@@ -215,7 +215,8 @@ def _approach(tree: Tree, cell: Any, relative: bool) -> None:
 def _summation(order: int, harmonic: bool) -> Callable[..., None]:
     """Compiled function that fills in bodies, near and moments of cells in ranges (k, 2).
 
-    (tree, ranges, relative, place, chosen, ascending, sums) -> None; the last cell of a range is the first.
+    (tree, ranges, relative, place, chosen, ascending, sums) -> None; the last cell of a range is
+    the first.
     """
     operations = translations(order, harmonic)
     particles_to_moments = operations.particles_to_moments

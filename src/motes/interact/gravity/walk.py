@@ -92,6 +92,7 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
         is_leaf = targets.cells[cell, NUMBER] == 0
         error = limits.error / math.sqrt(max(count, FULL) / FULL)
         allowed = min(error, limits.force / max(targets.bodies[cell, MASS], 1e-300))
+        allowed = max(allowed, real(1e-30))
         stricter = real(1.0 / allowed), real(limits.easier / allowed)
         few = np.int32(limits.few // count)
         ascending = read(desk.ascending, 0)
@@ -120,7 +121,7 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
             separate, low_order_does, others = is_far(
                 sources.balls, chosen, own, stricter, opening2, reach, e2
             )
-            start, end, first, children = columns(sources.cells, chosen)
+            start, end, _, children = columns(sources.cells, chosen)
             valid = ascending < np.int32(number)
             inner = children > np.int32(0)
             if is_leaf:
@@ -147,7 +148,7 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
                 expand_easily(sources, own, e2, easy, LANES, desk)
                 easily -= LANES
                 write(easy, 0, read(easy, LANES))
-        if 0 < accepted and accepted + easily <= LANES:
+        if accepted > 0 and accepted + easily <= LANES:
             for lane in range(easily):
                 far[accepted + lane] = easy[lane]
             accepted, easily = accepted + easily, 0
