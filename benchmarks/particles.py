@@ -2,7 +2,8 @@
 
 Gravity, drag and a vortex by the classical Runge-Kutta method in single precision. The yardstick is
 a bare in-place update of the six columns, x += c, on the same threads: what memory allows. Peers
-that cannot be imported are left out with a line that says so. Times are the best of several.
+that cannot be imported are left out with a line that says so. Rates are the best of several, taken
+in turn.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import json
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,9 @@ from _report import Report, arguments, best, machine
 import motes
 from motes.jit import blocks, jit, share
 from motes.memory import allocate
+
+Task = Callable[[], float]
+"""Does a share of some work; returns its rate [M/s]."""
 
 STEP = 1e-3
 RATE, CORE, STRENGTH = 0.1, 0.1, 2.0
@@ -53,17 +58,23 @@ def scene(
     return motes.Scene(systems=[system], solid=solids, step=STEP, integrator=integrator)
 
 
-def speed(document: motes.Scene, steps: int, repeats: int) -> float:
-    """Millions of particle-steps per second."""
+def stepping(document: motes.Scene, steps: int) -> Task:
+    """A simulation's next steps."""
     simulation = motes.Simulation(document)
     simulation.run(steps=2)
 
-    rates = []
-    for _ in range(repeats + 1):
+    def run() -> float:
         work, start = simulation.work, time.perf_counter()
         simulation.run(steps=steps)
-        rates.append((simulation.work - work) / (time.perf_counter() - start) / 1e6)
-    return max(rates[1:])
+        return (simulation.work - work) / (time.perf_counter() - start) / 1e6
+
+    return run
+
+
+def fastest(*tasks: Task, rounds: int) -> list[float]:
+    """The best rate of each task. They run in turn, since a shared machine has slow minutes."""
+    rates = [[task() for task in tasks] for _ in range(rounds)]
+    return [max(column) for column in zip(*rates, strict=True)]
 
 
 @jit
@@ -79,14 +90,17 @@ def _bare(block, c, low, high):  # type: ignore[no-untyped-def]
         w[i] += c
 
 
-def bare(n: int, repeats: int) -> float:
-    """Millions of rows of six columns per second: each is read, added to, written."""
+def bare(n: int) -> Task:
+    """Rows of six columns: each is read, added to, written."""
     block, parts = allocate((6, n), np.float32, "the yardstick"), blocks(n, 1 << 17)
 
-    def update() -> None:
+    def update() -> float:
+        start = time.perf_counter()
         share(lambda k: _bare(block, np.float32(1e-9), *parts[k]), len(parts))
+        return n / (time.perf_counter() - start) / 1e6
 
-    return n / best(update, repeats) / 1e6
+    update()
+    return update
 
 
 def numpy_step(x: np.ndarray, v: np.ndarray) -> None:
@@ -154,29 +168,39 @@ def main() -> None:
     parser.add_argument("--bpy-python", help="a Python that has Blender's wheel bpy")
     parser.add_argument("--sizes", action="store_true", help="cost per particle by count, too")
     options = parser.parse_args()
-    n, steps, repeats = (200_000, 20, 2) if options.quick else (10_000_000, 10, 4)
+    n, steps, rounds = (200_000, 20, 2) if options.quick else (10_000_000, 20, 6)
     report = Report(
         f"{n:,} particles, rk4, single precision: gravity, drag, vortex; M particle-steps/s",
         machine=machine(("taichi", "warp-lang")),
     )
 
-    def add(name: str, value: float) -> None:
-        report.figures[name] = value, "M/s"
-
-    add("bare update", bare(n, 3 * repeats))
-    add("motes", speed(scene(n), steps, repeats))
-    add("motes, ground and births", speed(scene(n, ground=True), 5, 2))
-    report.ratio("motes", "bare update")
-    report.ratio("motes, ground and births", "bare update")
     few = n // 10
+
+    def race(rounds: int, tasks: dict[str, Task]) -> None:
+        for name, rate in zip(tasks, fastest(*tasks.values(), rounds=rounds), strict=True):
+            report.figures[name] = rate, "M/s"
+
+    grounded = "motes, ground and births"
+    race(
+        2 * rounds,
+        {
+            "bare update": bare(n),
+            "motes": stepping(scene(n), steps),
+            grounded: stepping(scene(n, ground=True), 2),
+        },
+    )
+    report.ratio("motes", "bare update")
+    report.ratio(grounded, "bare update")
     for method in ("semi_implicit_euler", "rk4"):
         plain, curved = f"{method}, {few:,}", f"{method}, two life curves"
-        add(plain, speed(scene(few, integrator=method), 4 * steps, repeats))
-        add(curved, speed(scene(few, integrator=method, curves=True), steps, repeats))
+        smooth = scene(few, integrator=method)
+        waving = scene(few, integrator=method, curves=True)
+        race(rounds, {plain: stepping(smooth, 4 * steps), curved: stepping(waving, steps)})
         report.ratio(curved, plain)
     if options.sizes:
-        for count in (n // 10, n, 3 * n):
-            add(f"motes, {count:,}", speed(scene(count), steps, repeats))
+        sizes = (n // 10, n, 10 * n)
+        tasks = {f"motes, {m:,}": stepping(scene(m), max(40 * n // m, 4)) for m in sizes}
+        race(rounds, tasks)
     peers(report, few, options.bpy_python)
     report.print(options.json)
 

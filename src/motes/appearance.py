@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from motes.control.constant import Constant
 from motes.control.control import Control
-from motes.control.curve import TABLE_SIZE, Curve
+from motes.control.curve import Curve
+from motes.jit import jit
 
 if TYPE_CHECKING:
     from motes.scene.document import System
@@ -58,9 +59,18 @@ def _values(control: Control, view: View) -> NDArray[Any]:
 def interpolated(control: Curve, place: NDArray[Any]) -> NDArray[np.float32]:
     """Values (n, width) of a curve over life or speed, from the table that kernels read too."""
     low, high = control.span
-    table = control.table().astype(np.float32)
-    u = np.clip((place - low) / max(high - low, 1e-30), 0, 1) * (TABLE_SIZE - 1)
-    left = np.minimum(u.astype(np.int32), TABLE_SIZE - 2)
-    weight = (u - left).astype(np.float32)[:, None]
-    values: NDArray[np.float32] = table[left] + weight * (table[left + 1] - table[left])
+    place = np.ascontiguousarray(place, np.float64)
+    values = np.empty((place.size, control.width), np.float32)
+    _interpolate(place, low, 1 / max(high - low, 1e-30), control.table, values)
     return values
+
+
+@jit
+def _interpolate(place: Any, low: Any, per_span: Any, table: Any, values: Any) -> None:
+    last = table.shape[0] - 1
+    for i in range(place.size):
+        u = min(max((place[i] - low) * per_span, 0.0), 1.0) * last
+        left = min(int(u), last - 1)
+        weight = u - left
+        for k in range(table.shape[1]):
+            values[i, k] = table[left, k] + weight * (table[left + 1, k] - table[left, k])

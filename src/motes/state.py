@@ -207,10 +207,12 @@ def _compact(array, dead, first, count):  # type: ignore[no-untyped-def]
 @jit
 def _first_not_finite(array):  # type: ignore[no-untyped-def]
     """Index of the first element that is infinite or not a number, or the size."""
-    bad = 0
-    for i in range(array.size):  # Counting is SIMD, a search is not.
-        bad += not abs(array[i]) < np.inf
-    if bad:
+    if array.size == 0:
+        return 0
+    none = array[0] * 0
+    for i in range(array.size):  # A sum is SIMD, a search is not; 0 times infinity is no number.
+        none += array[i] * 0
+    if none != 0:
         for i in range(array.size):
             if not abs(array[i]) < np.inf:
                 return i

@@ -112,7 +112,7 @@ class Values:
             scale = self.constant(1.0 / max(high - low, 1e-30))
             place = f"(speed - {self.constant(low)}) * {scale}"
         first = len(self.tables)
-        self.tables += list(control.table().T)
+        self.tables += list(control.table.T)
         return [f"lookup(L, {first + i}, {place})" for i in range(control.width)]
 
     def _pieces(self, found: Pieces) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,7 @@ class Curve(Control):
             return 0.0, 1.0
         return float(self.spline.times[0]), float(self.spline.times[-1])
 
+    @cached_property
     def table(self) -> Values:
         """The curve sampled at equal distances over its span, shape (TABLE_SIZE, width)."""
         low, high = self.span

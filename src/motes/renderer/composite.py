@@ -62,42 +62,41 @@ def composite(
     depth: Any,
     edge: Any,
     samples: Any,
+    bounds: Any,
     backdrop: Any,
     fresh: Any,
     final: Any,
     image: Any,
 ) -> None:
-    """Composite the tiles [first_tile, last_tile) of image (h, w, 4).
+    """Composite the tiles [first_tile, last_tile) of an image (h, w, 4).
 
     records holds the rows starts[tile] to starts[tile + 1] of each tile, and order the same rows
     from near to far; it is empty where nothing hides anything. depth (h, w) is the distance of
     solids along the axis, or (0, 0) without any; edge (h, w) is the row of `samples` (e, 4) of a
-    pixel on a silhouette, or -1. A fresh image starts clear, one that is not holds C and T of
-    nearer records; a final one is put over the backdrop and gets the alpha channel in place of T.
+    pixel on a silhouette, or -1; bounds (tiles, 2) is the least and greatest depth in each tile, or
+    (0, 2). image and backdrop come as rows of 4 w numbers. A fresh image starts clear, one that is
+    not holds C and T of nearer records; a final one is put over the backdrop and gets the alpha
+    channel in place of T.
     """
     buffer = np.empty(_CLEAR + _PLANE, np.float32)
-    weight = np.empty(_STRIDE, np.float32)
+    weight, ramp = np.empty(_STRIDE, np.float32), np.empty(_STRIDE, np.float32)
+    for a in range(ramp.size):
+        ramp[a] = np.float32(a)  # Read below, since no SIMD instruction makes floats of counts.
     wide = records.shape[1] > 8
     for tile in range(first_tile, last_tile):
         left, top = tile % across * TILE, tile // across * TILE
-        columns, rows = min(TILE, image.shape[1] - left), min(TILE, image.shape[0] - top)
+        columns, rows = min(TILE, image.shape[1] // 4 - left), min(TILE, image.shape[0] - top)
         buffer[:_CLEAR] = _ZERO
         buffer[_CLEAR:] = _ONE
         if not fresh:
             for b in range(rows):
                 for a in range(columns):
                     for k in range(4):
-                        place = np.uint64(k) * _PLANE + np.uint64(b) * _STRIDE + np.uint64(a)
-                        buffer[place] = image[top + b, left + a, k]
+                        at = np.uint64(k) * _PLANE + np.uint64(b) * _STRIDE + np.uint64(a)
+                        buffer[at] = image[top + b, 4 * (left + a) + k]
         closest, deepest = _FAR, _FAR
-        if depth.shape[0] > 0 and starts[tile] < starts[tile + 1]:
-            deepest = _ZERO
-            for b in range(top, top + rows):
-                for a in range(left, left + columns):
-                    row = edge[b, a]
-                    for k in range(4 if row >= 0 else 1):
-                        d = samples[row, k] if row >= 0 else depth[b, a]
-                        closest, deepest = min(closest, d), max(deepest, d)
+        if bounds.shape[0] > 0:
+            closest, deepest = bounds[tile, 0], bounds[tile, 1]
         for rank in range(starts[tile], starts[tile + 1]):
             i = np.int64(order[rank]) if order.shape[0] > 0 else rank
             radius, inverse = records[i, 2], records[i, 3]
@@ -148,7 +147,7 @@ def composite(
                     # The common case in one loop: the mean over no way at all.
                     rest = _ONE - from_y * from_y
                     for a in range(n):
-                        u = from_x + np.float32(a) * scale
+                        u = from_x + ramp[a] * scale
                         w = max(rest - u * u, _ZERO)
                         w *= w * w * buffer[at + _CLEAR + a]
                         buffer[at + a] += w * red
@@ -158,7 +157,7 @@ def composite(
                     continue
                 along, aside = from_x * ux + from_y * uy + offset, from_y * ux - from_x * uy
                 for a in range(n):
-                    part = np.float32(a)
+                    part = ramp[a]
                     w = _streak(along + part * along_step, aside - part * aside_step, way)
                     weight[a] = w * per_way
                 if tested:
@@ -191,12 +190,12 @@ def composite(
             line = buffer[np.int64(b) * np.int64(_STRIDE) :]
             red_of, green_of, blue_of = line[:columns], line[_GREEN:], line[_BLUE:]
             clear_of = line[_CLEAR:]
-            shown = image[top + b, left : left + columns]
-            under = backdrop[top + b, left : left + columns]
+            shown = image[top + b, 4 * left : 4 * (left + columns)]
+            under = backdrop[top + b, 4 * left : 4 * (left + columns)]
             for a in range(columns):
-                clear = clear_of[a]
+                clear, place = clear_of[a], 4 * a
                 behind = clear if final else _ZERO
-                shown[a, 0] = red_of[a] + behind * under[a, 0]
-                shown[a, 1] = green_of[a] + behind * under[a, 1]
-                shown[a, 2] = blue_of[a] + behind * under[a, 2]
-                shown[a, 3] = _ONE - clear * (_ONE - under[a, 3]) if final else clear
+                shown[place] = red_of[a] + behind * under[place]
+                shown[place + 1] = green_of[a] + behind * under[place + 1]
+                shown[place + 2] = blue_of[a] + behind * under[place + 2]
+                shown[place + 3] = _ONE - clear * (_ONE - under[place + 3]) if final else clear

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,22 @@ class Depths:
     samples: Array
     """(e, 4) depths within such a pixel."""
 
+    @cached_property
+    def bounds(self) -> Array:
+        """(tiles, 2) least and greatest depth in each tile; (0, 2) where there are no solids."""
+        if not self.depth.size:
+            return np.empty((0, 2), np.float32)
+        row, column = np.nonzero(self.edge >= 0)
+        within = self.samples[self.edge[row, column]]
+        starts = [np.arange(0, size, TILE) for size in self.depth.shape]
+        bounds = []
+        for extreme in (np.minimum, np.maximum):
+            depth = self.depth.copy()
+            depth[row, column] = extreme.reduce(within, axis=1)
+            rows = extreme.reduceat(depth, starts[0], axis=0)
+            bounds.append(extreme.reduceat(rows, starts[1], axis=1).ravel())
+        return np.stack(bounds, axis=1)
+
 
 NO_LAMPS = np.empty((0, 7), np.float32)
 NO_LIGHT = np.empty((0, 3), np.float32)
@@ -74,6 +91,8 @@ def splat(
     records = _project(layers, camera, (width, height), shutter, light, lamps)
     covers = any(layer.opacity > 0 for layer in layers)
     image = np.empty((height, width, 4), np.float32)
+    shown = image.reshape(height, 4 * width)
+    under = np.ascontiguousarray(backdrop).reshape(height, 4 * width)
     slabs = _slabs(records, across, down)
     for number, slab in enumerate(slabs):
         starts, packed = _pack(slab, across, down)
@@ -93,8 +112,8 @@ def splat(
             if covers:
                 sort_tiles(low, high, starts, packed, order)
             tiles = (low, high, across, starts, order, packed)
-            solids = (depths.depth, depths.edge, depths.samples)
-            composite(*tiles, *solids, backdrop, fresh, final, image)
+            solids = (depths.depth, depths.edge, depths.samples, depths.bounds)
+            composite(*tiles, *solids, under, fresh, final, shown)
 
         share(task, len(cuts) - 1)
     return image

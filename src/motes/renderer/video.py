@@ -16,10 +16,13 @@ from motes.renderer.picture import PNG_LEVEL
 
 Pixels = NDArray[np.uint8]
 
+_X264 = {"crf": "19", "preset": "superfast", "x264-params": "sliced-threads=0:bframes=0"}
+
 _CODECS: dict[str, tuple[str, str, str, dict[str, str]]] = {
     # suffix: container, codec, pixel format, settings. The settings, the number of threads
-    # included, are fixed so that the same frames give the same file.
-    ".mp4": ("mp4", "libx264", "yuv420p", {"crf": "17", "preset": "superfast"}),
+    # included, are fixed so that the same frames give the same file. Frames that point ahead cost
+    # a film of drifting points a fifth of its time and save it a sixtieth of its size.
+    ".mp4": ("mp4", "libx264", "yuv420p", _X264),
     ".webp": ("webp", "libwebp_anim", "yuv420p", {"quality": "85", "compression_level": "2"}),
 }
 
