@@ -9,7 +9,8 @@ from test_gravity import plummer_sphere
 from motes import gravity
 from motes.interact.gravity.expansions import folded, terms
 from motes.interact.gravity.multipole import Plan, Problem
-from motes.interact.gravity.tree import NUMBER, Box, octree, summarize
+from motes.interact.gravity.tree import NUMBER, Box, octree
+from motes.interact.gravity.upward import summarize
 
 
 def distributions(n):

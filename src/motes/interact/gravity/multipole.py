@@ -23,12 +23,11 @@ from motes.interact.gravity.tree import (
     START,
     Box,
     Tree,
-    divide_work,
     largest_leaf,
     octree,
-    summarize,
     unpermute,
 )
+from motes.interact.gravity.upward import divide_work, summarize
 from motes.interact.gravity.walk import walker
 from motes.jit import blocks, share, threads
 
