@@ -130,7 +130,7 @@ def fmm3dpy_tasks(cloud: Cloud) -> Iterator[tuple[str, Accelerations]]:
         found = fmm3dpy.lfmm3d(eps=eps, sources=points, charges=cloud.m, pg=2)
         return 4 * np.pi * np.asarray(found.grad).T
 
-    for eps in (1e-3, 1e-4, 1e-6):
+    for eps in (1e-3, 1e-4):  # A smaller eps has the error of 1e-4 at these numbers.
         yield f"fmm3dpy, eps {eps:.0e}", lambda e=eps: gradient(e)
 
 
@@ -201,7 +201,7 @@ PARTS: dict[str, Callable[[Report, bool], None]] = {
         report, 20_000 if quick else 200_000, pytreegrav_tasks, True
     ),
     "fmm3dpy": lambda report, quick: peers(
-        report, 20_000 if quick else 200_000, fmm3dpy_tasks, False
+        report, 20_000 if quick else 100_000, fmm3dpy_tasks, False
     ),
     "crossover": lambda report, quick: crossovers(report, [4_000] if quick else CROSSINGS),
     "start": lambda report, quick: starts(report, [1e-3] if quick else [1e-3, 1e-5, 1e-8]),
