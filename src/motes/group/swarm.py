@@ -57,7 +57,7 @@ class _Sorted:
         if key not in self.columns:
             row = self.cells.row
             real = self.cells.position.dtype
-            out = self.columns[key] = room_for(self.room, key, (row.size + LANES,), real)
+            out = self.columns[key] = room_for(self.room, f"column {key}", (row.size + LANES,), real)
             out[row.size :] = 0
             values, parts = self.body.column(key), blocks(row.size, ROWS)
 
@@ -169,8 +169,8 @@ class Swarm:
                     chosen: Array = np.empty(room + LANES, np.int32)
                     begin, needed = kernel(
                         numbers, mine, slot, target.cells.key, int(target.grid.shape[0]), theirs,
-                        source.grid, source.cells, begin, end, run, shift, self._slots, chosen, hold,
-                        source is not sources[0], source is sources[-1], kept,
+                        source.grid, source.cells, begin, end, run, shift, self._slots, chosen,
+                        hold, source is not sources[0], source is sources[-1], kept,
                         target.cells.row, push,
                     )  # fmt: skip
                     room = self._room = max(room, 2 * needed)

@@ -191,9 +191,7 @@ def _index(key: Any, begin: Any, shift: Any, last: Any, first: Any) -> None:
         first[entry:] = begin + key.size - skipped
 
 
-def sort(
-    position: NDArray[Any], grid: Grid, spare: int = 0, room: Room | None = None
-) -> Cells:
+def sort(position: NDArray[Any], grid: Grid, spare: int = 0, room: Room | None = None) -> Cells:
     """The points (3, n) in the order of (cell, row), with room for some more behind them.
 
     What is returned is in `room`, if one is given, until it serves again.
