@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -291,6 +291,8 @@ class _Follower:
             self.wait()
 
     def wait(self) -> None:
-        """Wait for all that was given."""
-        while self._waiting:
-            self._waiting.popleft().result()
+        """Wait for all that was given; the first exception is raised when nothing runs any more."""
+        given, self._waiting = self._waiting, deque()
+        wait(given)
+        for future in given:
+            future.result()

@@ -27,6 +27,10 @@ CAPTURE = np.dtype(
 """One capture: scene time [s], ids of both, and where [m]."""
 
 
+NOBODY: NDArray[np.int64] = np.zeros(0, np.int64)
+"""No rows."""
+
+
 class Animals(NamedTuple):
     """Particles of one system as a law of captures sees them."""
 
@@ -53,7 +57,7 @@ class Captures:
 
     def rows(self, name: str) -> NDArray[np.int64]:
         """Rows of a system that were caught in the step."""
-        return self.caught.get(name, np.zeros(0, np.int64))
+        return self.caught.get(name, NOBODY)
 
     def find(
         self,
@@ -64,11 +68,13 @@ class Captures:
         values: Callable[[Component, float], Any],
     ) -> None:
         """Find who is caught at the end of an interval [s]; of several laws the first has it."""
+        if not self.laws:
+            return
         self.caught = {}
         begin, end = interval
         animals = {
             name: Animals(name, systems[name].position[:, :n], systems[name].ids[:n])
-            for name, n in (alive.items() if self.laws else ())
+            for name, n in alive.items()
         }
         for address, law in self.laws:
 

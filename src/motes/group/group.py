@@ -28,6 +28,11 @@ from motes.state import Particles
 from motes.step import Interval, Stepper
 from motes.tableau import Implicit, Splitting
 
+NOTHING: dict[Any, NDArray[Any]] = {
+    real: np.zeros((3, 0), real) for real in (np.float32, np.float64)
+}
+"""No push, by type of numbers."""
+
 
 class Group:
     """Steps systems that interact."""
@@ -50,6 +55,7 @@ class Group:
         self.captures = Captures(having(interactions, "captures"), steppers)
         self.contacts = Contacts(solids if self.exchanges else ())
         self._strict, self._periodic = strict, periodic
+        self._members: dict[str, Member] = {}
         self.nearby = self._nearby(precision)
         motions = [stepper.system.motion for stepper in steppers.values()]
         self.method = motions[0].method
@@ -85,8 +91,9 @@ class Group:
         kept = {name: (alive[name], systems[name].deaths) for name in alive}
         if memory.kept != kept:
             memory.kept, memory.push = kept, None
-        self.nearby.settle(self._bodies(systems, alive, interval.begin), memory)
-        members = {name: self._member(name, systems[name], alive[name]) for name in alive}
+        begin = partial(self._bodies, systems, alive, interval.begin)
+        self.nearby.settle(kept, begin, memory)
+        members = {name: self._member(name, systems[name], alive[name], memory) for name in alive}
         if isinstance(self.method, Splitting):
             split(self, members, interval, self.method, memory)
         elif isinstance(self.method, Implicit):
@@ -97,32 +104,41 @@ class Group:
             if stepper.system.surfaces is not None:
                 if stepper.rebounds(systems[name], members[name].y, alive[name], interval):
                     memory.push = None
-                systems[name].motion[:, : alive[name]] = members[name].y
+                systems[name].motion[:, : alive[name]] = members[name].y[:, : alive[name]]
         for address, part in self.exchanges:
             self._exchange(address, part, members, interval, memory)
         seed = next(iter(self.steppers.values())).seed
         span = (interval.begin, interval.end)
         self.captures.find(systems, span, seed, alive, values)
         for name, stepper in self.steppers.items():
-            newborn = np.arange(alive[name], systems[name].count)
-            stepper.exceptions(systems[name], newborn, interval)
+            rows = systems[name]
+            if rows.count > alive[name]:
+                stepper.exceptions(rows, np.arange(alive[name], rows.count), interval)
             stepper.events()
-            rows, caught = systems[name], self.captures.rows(name)
-            stepper.deaths(rows, np.arange(rows.count), interval, caught)
+            caught = self.captures.rows(name)
+            if caught.size or stepper.system.motion.mortal:
+                stepper.deaths(rows, np.arange(rows.count), interval, caught)
 
     def _bodies(
         self, systems: dict[str, Particles], alive: dict[str, int], time: float
     ) -> dict[str, Body]:
         found = {}
         for name, stepper in self.steppers.items():
-            rows, n = systems[name], alive[name]
-            found[name] = Body(stepper, rows, n, rows.position[:, :n], rows.velocity[:, :n], time)
+            rows = systems[name]
+            found[name] = Body(stepper, rows, alive[name], rows.motion, time)
         return found
 
-    def _member(self, name: str, rows: Particles, alive: int) -> Member:
+    def _member(self, name: str, rows: Particles, alive: int, memory: Lasting) -> Member:
         stepper = self.steppers[name]
-        y = rows.motion if stepper.system.surfaces is None else rows.motion[:, :alive].copy()
-        return Member(stepper, rows, alive, y, np.zeros((3, 0), rows.real))
+        flies = stepper.system.surfaces is not None
+        member, push = self._members.get(name), memory.pushes.get(name, NOTHING[rows.real])
+        if member is None or not member.fits(rows, alive):
+            y = np.empty_like(rows.motion) if flies else rows.motion
+            member = self._members[name] = Member(stepper, rows, alive, y, push)
+        if flies:
+            member.y[:, :alive] = rows.motion[:, :alive]
+        member.push = push
+        return member
 
     def interact(self, members: dict[str, Member], time: float, memory: Lasting) -> None:
         """Give every member the push of the interactions at a time.
@@ -139,7 +155,7 @@ class Group:
     def _pushes(
         self, members: dict[str, Member], time: float, memory: Lasting
     ) -> dict[str, NDArray[Any]]:
-        pushes = {name: np.zeros((3, m.alive), m.y.dtype) for name, m in members.items()}
+        pushes = {name: memory.pushed(name, m.alive, m.y.dtype) for name, m in members.items()}
         if self.interactions:
             bodies = []
             for name, m in members.items():

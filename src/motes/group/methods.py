@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,9 +18,9 @@ from motes.compile import implicit
 from motes.compile.staged import combine
 from motes.errors import SimulationError
 from motes.group.lasting import Lasting
-from motes.group.members import BLOCK, Member
+from motes.group.members import Member
 from motes.group.partners import partners, values
-from motes.jit import blocks, share
+from motes.jit import even_blocks, share
 from motes.step import Interval
 from motes.tableau import Explicit, Implicit, Splitting
 
@@ -38,17 +39,23 @@ def split(
     before = {
         name: m.y[3:, : m.alive].copy() for name, m in members.items() if group.constraints.laws
     }
-    for kick, drift, place in zip(method.kicks, (*method.drifts, 0.0), method.times, strict=True):
+    for kick, drift, place in _turns(method):
         time = _at(interval, place)
         if kick:
             group.interact(members, time, memory)
             for member in members.values():
-                member.each("kick", member.K, time, kick * h)
+                member.each("kick", member.K, numbers=(time, kick * h))
         if drift:
             group.constraints.apply(members, before, time, drift * h, partners, values)
             memory.push = None
             for member in members.values():
-                member.each("drift", member.K, time, drift * h)
+                member.each("drift", member.K, numbers=(time, drift * h))
+
+
+@cache
+def _turns(method: Splitting) -> list[tuple[float, float, float]]:
+    """Kick, drift after it and place in the step of every turn."""
+    return list(zip(method.kicks, (*method.drifts, 0.0), method.times, strict=True))
 
 
 def runge_kutta(
@@ -66,7 +73,7 @@ def runge_kutta(
         time = _at(interval, method.c[i])
         group.interact(members, time, memory)
         for name, member in members.items():
-            member.each("slope", slopes[name][i], member.K, time)
+            member.each("slope", slopes[name][i], member.K, numbers=(time,))
 
 
 def implicit_stages(
@@ -88,7 +95,7 @@ def implicit_stages(
         if not g:
             group.interact(members, time, memory)
             for name, member in members.items():
-                member.each("slope", slopes[name][place], member.K, time)
+                member.each("slope", slopes[name][place], member.K, numbers=(time,))
             continue
         known = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
         last = math.inf
@@ -97,7 +104,7 @@ def implicit_stages(
             group.interact(members, time, memory)
             memory.push = None
             for name, member in members.items():
-                member.each("settled", known[name], member.K, time, g)
+                member.each("settled", known[name], member.K, numbers=(time, g))
             change = max(_change(m.y[:, : m.alive], before[name]) for name, m in members.items())
             if change <= 1 or not change < last:
                 break
@@ -127,7 +134,7 @@ def _combine(
 ) -> None:
     """Every member's state becomes base + h sum_j weights_j slopes_j."""
     for name, member in members.items():
-        parts, real = blocks(member.alive, BLOCK), member.y.dtype.type
+        parts, real = even_blocks(member.alive), member.y.dtype.type
         row = np.array(weights, float).astype(real)
         arguments = (bases[name], slopes[name], row, real(h), member.y)
         share(lambda k, a=arguments, p=parts: combine(*a, *p[k]), len(parts))  # type: ignore[misc]

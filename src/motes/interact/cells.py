@@ -62,6 +62,18 @@ class Cells(NamedTuple):
     """Lower bits of a cell's number that the table leaves out."""
 
 
+def numbers(name: str, given: Any, real: Any = None) -> NDArray[Any]:
+    """An array of real numbers. Raises ValueError, with its name, for what is none."""
+    try:
+        array = np.asarray(given)
+        if array.dtype.kind in "biuf":
+            return array if real is None else array.astype(real)
+    except ValueError:  # Rows of different lengths.
+        pass
+    kind = type(given).__name__
+    raise ValueError(f"{name} must be an array of real numbers, all rows as long, not a {kind}")
+
+
 def period(box: Any, dimensions: int, real: type) -> NDArray[Any]:
     """The box's edges as three numbers, infinite along open axes.
 
@@ -70,9 +82,9 @@ def period(box: Any, dimensions: int, real: type) -> NDArray[Any]:
     """
     edges: NDArray[Any] = np.full(3, np.inf, real)
     if box is not None:
-        given: NDArray[Any] = np.asarray(box, real)
+        given = numbers("box", box, real)
         if given.ndim > 1 or given.size not in (1, dimensions):
-            raise ValueError(f"box must be one length or {dimensions}, not {box!r}")
+            raise ValueError(f"box must be one length or {dimensions}, not of shape {given.shape}")
         edges[:dimensions] = given
     if not np.all(edges > 0):
         raise ValueError(f"box = {box!r} must have edges above 0 (infinite along open axes)")
