@@ -306,3 +306,21 @@ def test_a_list_is_stale_before_it_is_built_and_after_births():
     x[7, 1] = np.nan
     with pytest.raises(ValueError, match=r"x\[7\]"):
         neighbours_of.stale(x)
+
+
+@pytest.mark.parametrize("keys", [3, 700, 5000])
+def test_rows_are_counted_into_order(keys: int) -> None:
+    """Stable order by whole keys: that of NumPy's, with where each key begins; a room serves again
+    for fewer and for more."""
+    from motes.interact.counting_sort import Room, counted_rows, sorted_rows
+
+    room: Room = {}
+    for n in (1, 2, 1237, 40, 3001):
+        key = np.random.default_rng(n).integers(0, keys, n).astype(np.uint64)
+        expected = np.argsort(key, kind="stable")
+        found, row, first = counted_rows(key, keys, room)
+        np.testing.assert_array_equal(row, expected)
+        np.testing.assert_array_equal(found, key[expected])
+        np.testing.assert_array_equal(first, np.searchsorted(key[expected], np.arange(keys + 1)))
+        found, row = sorted_rows(key, 13)
+        np.testing.assert_array_equal(row, expected)

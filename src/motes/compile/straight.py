@@ -110,14 +110,13 @@ def _write_step(
         marks.append(f"uint8({DEAD}) * uint8(gone)")
     if marks:
         body += f"            flag[i] = uint8({' | '.join(marks)})\n"
-    found = ""
-    for name, time, wanted in (("ages", "t", aged), ("old", "end", outlived)):
-        if wanted:
-            prelude += f"    room_of_{name} = empty({CHUNK}, F)\n"
-            found += f"        {name} = room_of_{name}[: high - low]\n"
-            found += (
-                f"        for i in range(born.size):\n            {name}[i] = F({time} - born[i])\n"
-            )
+    since = [("ages", "t")] * aged + [("old", "end")] * outlived
+    found = "".join(f"        {name} = room_of_{name}[: high - low]\n" for name, _ in since)
+    if since:
+        found += "        for i in range(born.size):\n"
+    for name, time in since:
+        prelude += f"    room_of_{name} = empty({CHUNK}, F)\n"
+        found += f"            {name}[i] = F({time} - born[i])\n"
     listing = ""
     if surfaces is not None:
         prelude += "    count = 0\n"

@@ -8,13 +8,15 @@ simulation are kept: instant, place, and both ids.
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motes.catalog import Component
+from motes.errors import SceneError
+from motes.group.partners import Interactions, named
 from motes.jit import EXACT, jit
 from motes.philox import channel, draw, uniform_double
 from motes.state import Particles
@@ -42,8 +44,12 @@ class Animals(NamedTuple):
 class Captures:
     """The laws of captures of one group, and what they have caught."""
 
-    def __init__(self, laws: Sequence[tuple[str, Component]]) -> None:
-        self.laws = tuple(laws)
+    def __init__(self, laws: Interactions, systems: Iterable[str]) -> None:
+        self.laws = laws
+        for _, law in laws:
+            if not law.values["hunters"].document():
+                raise SceneError(f'interaction "{law.name}": hunters must name who catches.')
+            named(law, "hunters", systems)
         self.caught: dict[str, NDArray[np.int64]] = {}
         """Rows caught in the last step, by system."""
         self.kept: list[NDArray[Any]] = []

@@ -52,7 +52,7 @@ class Group:
         self._local = having(interactions, "reach")
         laws = having(interactions, "velocities")
         self.constraints = Constraints(laws, Ground(solids if laws else ()))
-        self.captures = Captures(having(interactions, "captures"))
+        self.captures = Captures(having(interactions, "captures"), steppers)
         self.contacts = Contacts(solids if self.exchanges else ())
         self._strict, self._periodic = strict, periodic
         self._members: dict[str, Member] = {}

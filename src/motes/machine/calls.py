@@ -23,7 +23,7 @@ from motes.machine.kinds import (
     Unsupported,
     of_dtype,
 )
-from motes.machine.lanes import bits, lowest, put, settled, take
+from motes.machine.lanes import bits, count, lowest, pack, put, settled, take
 from motes.machine.memory import Memory
 from motes.machine.shuffles import SEEKING_NEEDS, near_slots, seeking, taken_apart, taking
 from motes.machine.values import Group, Known, Scalar, Value, View, type_of
@@ -222,6 +222,10 @@ class Calls(Memory):
         whole = self.cast(self._number(number), UINT).text
         return Scalar(UINT, self.do(f"call i64 @llvm.cttz.i64(i64 {whole}, i1 true)"))
 
+    def count(self, marks: Value) -> Value:
+        """`lanes.count`."""
+        return self.intrinsic("ctpop", self.cast(self._number(marks), UINT))
+
     def empty(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
         """numpy.empty: room that the call has for itself; its numbers are not set."""
         item = of_dtype(np.dtype(_thing(kind)))
@@ -354,6 +358,8 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     take: Calls.take,
     put: Calls.put,
     bits: Calls.bits,
+    count: Calls.count,
+    pack: Calls.pack,
     lowest: Calls.lowest,
     settled: _intrinsic("arithmetic.fence"),
     math.fabs: _intrinsic("fabs"),

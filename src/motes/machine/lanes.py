@@ -38,3 +38,16 @@ def lowest(number: Any) -> Any:
 def settled(value: Any) -> Any:
     """A number that is to be computed first, and not taken apart to be computed otherwise."""
     return value
+
+
+def count(marks: Any) -> Any:
+    """How many bits of an unsigned integer are set."""
+    return np.uint64(int(marks).bit_count())
+
+
+def pack(array: Any, place: Any, value: Any, marks: Any) -> None:
+    """Write the lanes of a value whose bits in `marks` are set one after another, from `place` on.
+
+    As many elements as there are lanes may change.
+    """
+    array[place] = value
