@@ -11,21 +11,24 @@ takes some thirty times as long and is only loaded when it is needed.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import hashlib
 import os
 import pickle
 import threading
-from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache, partial, update_wrapper
 from pathlib import Path
 from typing import Any
 
 from motes.errors import OutputError, SceneError
 from motes.files import written_whole
+from motes.pool import available_processors, blocks, even_blocks, share, share_out, threads
+
+__all__ = [
+    "EXACT", "FAST", "STRICT", "Calls", "Kernel", "available_processors", "blocks", "bound",
+    "cache_folder", "each", "even_blocks", "jit", "listen", "share", "threads",
+]  # fmt: skip
 
 FAST = frozenset({"reassoc", "contract", "arcp", "nsz"})
 """Reorders and fuses arithmetic, but NaN and infinity stay honest (no nnan, no ninf)."""
@@ -96,7 +99,7 @@ class Kernel:
         numbers: list[Any] = []
         for argument in arguments:
             spread(argument, key, numbers)
-        door = self._doors.get(tuple(key)) or self._open(tuple(key), arguments)
+        door = self.door(tuple(key), arguments)
         return door(numbers) if door is not self else self.dispatcher(*arguments)
 
     def bind(self, *arguments: Any) -> Callable[..., Any]:
@@ -118,7 +121,7 @@ class Kernel:
             for argument in rest:
                 spread(argument, found, numbers)
             whole = tuple(found)
-            door = self._doors.get(whole) or self._open(whole, (*arguments, *rest))
+            door = self.door(whole, (*arguments, *rest))
             if door is self:
                 return self.dispatcher(*arguments, *rest)
             if PLAIN.issuperset(key):
@@ -143,15 +146,18 @@ class Kernel:
             spread(argument, key, numbers)
         last, lasts = calls.spread()
         whole = (*key, *last)
-        door = self._doors.get(whole) or self._open(whole, (*head, *tails[0]))
+        door = self.door(whole, (*head, *tails[0]))
         run = None if door is self else door.each(numbers, lasts)
         if run is None:
             share(lambda k: self(*head, *tails[k]), len(tails))
         else:
-            _share_out(run, len(tails))
+            share_out(run, len(tails))
+
+    def door(self, key: tuple[Any, ...], arguments: Sequence[Any]) -> Any:
+        """The door for arguments of these types; the kernel itself where Numba must compile it."""
+        return self._doors.get(key) or self._open(key, arguments)
 
     def _open(self, key: tuple[Any, ...], arguments: Sequence[Any]) -> Any:
-        """The door for arguments of these types; the kernel itself where Numba must compile it."""
         from motes.machine.door import kind_of
         from motes.machine.kinds import Unsupported
 
@@ -311,91 +317,3 @@ def listen(listener: Callable[[str], None] | None) -> None:
     """Call `listener` with a kernel's name each time that one is not in the cache, or nobody."""
     global _listener
     _listener = listener
-
-
-# ---------------------------------------------------------------------------- threads
-
-_threads = 0
-_pool: ThreadPoolExecutor | None = None
-
-
-def threads(count: int | None = None) -> int:
-    """Number of threads that kernels use; with `count`, set it first (0: one per processor).
-
-    The environment variable MOTES_THREADS sets the first value. Results never depend on it.
-    """
-    global _threads, _pool
-    if count is None and not _threads:
-        try:
-            count = int(os.environ.get("MOTES_THREADS", "0"))
-        except ValueError:
-            count = 0
-    if count is not None:
-        if count < 0:
-            raise ValueError(f"threads must be 0 (one per processor) or more, not {count}")
-        _threads = count or available_processors()
-        if _pool is not None:
-            _pool.shutdown()
-            _pool = None
-    return _threads
-
-
-def available_processors() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def share(task: Callable[[int], Any], count: int) -> None:
-    """Run `task(0) ... task(count - 1)` on the threads; the first exception is raised again here.
-
-    The calling thread works too, so that a short call costs little. An interrupt (Ctrl-C) drops the
-    tasks that have not begun and waits for the running ones, each of which should take at most
-    about 100 ms.
-    """
-    numbers = iter(range(count))  # Each thread takes the next one.
-
-    def work() -> None:
-        for number in numbers:
-            task(number)
-
-    _together(work, count, lambda: deque(numbers, 0))
-
-
-def _together(work: Callable[[], None], count: int, drop: Callable[[], Any]) -> None:
-    """Work on all threads that so many tasks are enough for; `drop` takes away what is left."""
-    global _pool
-    helpers = []
-    if count > 1 and threads() > 1:
-        if _pool is None:
-            _pool = ThreadPoolExecutor(threads(), "motes")
-        helpers = [_pool.submit(work) for _ in range(min(threads(), count) - 1)]
-    try:
-        work()
-        for helper in helpers:
-            helper.result()
-    except BaseException:
-        drop()
-        wait(helpers)
-        raise
-
-
-AT_ONCE = 16
-"""Calls that a thread does before it looks whether it was interrupted."""
-
-
-def _share_out(run: Callable[[Any, int], None], count: int) -> None:
-    """Run calls that are taken from a counter, on the threads."""
-    counter = ctypes.c_int64(0)
-
-    def work() -> None:
-        while counter.value < count:
-            run(ctypes.addressof(counter), AT_ONCE)
-
-    _together(work, count, lambda: setattr(counter, "value", count))
-
-
-def blocks(rows: int, size: int) -> list[tuple[int, int]]:
-    """Half-open ranges of at most `size` rows that cover `rows`."""
-    return [(low, min(low + size, rows)) for low in range(0, rows, size)]

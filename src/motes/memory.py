@@ -32,17 +32,22 @@ def budget() -> int:
     return _budget
 
 
+def afford(size: int, what: str) -> None:
+    """Raise MemoryBudgetError when so many bytes, together, are more than the budget."""
+    if size > budget():
+        raise MemoryBudgetError(
+            f"{what} would need {_shown(size)}, more than the budget of {_shown(budget())}. "
+            "Emit fewer particles, shorten their life, set a capacity, or raise MOTES_MEMORY [MiB]."
+        )
+
+
 def allocate(shape: tuple[int, ...], dtype: DTypeLike, what: str) -> NDArray[Any]:
     """An array of zeros that begins at a cache line.
 
     Raises MemoryBudgetError, with nothing allocated, when it is too large.
     """
     size = int(np.prod(shape, dtype=object)) * np.dtype(dtype).itemsize
-    if size > budget():
-        raise MemoryBudgetError(
-            f"{what} would need {_shown(size)}, more than the budget of {_shown(budget())}. "
-            "Emit fewer particles, shorten their life, set a capacity, or raise MOTES_MEMORY [MiB]."
-        )
+    afford(size, what)
     try:
         room = np.zeros(size + LINE, np.uint8)
     except MemoryError:

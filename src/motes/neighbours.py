@@ -13,6 +13,7 @@ Simulation Using Particles (1988), section 8.4.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import index as index_of
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -68,7 +69,12 @@ def nearest(
     """
     from motes.interact.cells import columns, period
     from motes.interact.nearest import nearest as search
+    from motes.memory import allocate
 
+    try:
+        k = index_of(k)
+    except TypeError:
+        raise ValueError(f"k = {k!r} must be a whole number") from None
     if k < 1:
         raise ValueError(f"k = {k} must be at least 1")
     points, places = _points(x, targets)
@@ -78,8 +84,12 @@ def nearest(
     if targets is not None:
         goals, others = columns(places, edges, "targets")
         bounds = _union(points, bounds, places, others)
-    index = np.full((len(places), k), -1, np.int32)
-    distance = np.full((len(places), k), np.inf, points.dtype)
+    what = f"the {k} nearest of {len(places)} places"
+    index, distance = (
+        allocate((len(places), k), real, what) for real in (np.int32, points.dtype)
+    )  # fmt: skip
+    index.fill(-1)
+    distance.fill(np.inf)
     wanted = min(k, len(points) - (targets is None))
     if wanted > 0 and len(places) > 0:
         own = targets is None
@@ -90,10 +100,13 @@ def nearest(
 
 def _around(x: ArrayLike, targets: ArrayLike | None, radius: float, box: Box, who: Any) -> Found:
     """What is within a radius of targets, or of the points themselves."""
-    from motes.interact.cells import columns, grid, period, sort
+    from motes.interact.cells import columns, grid, numbers, period, sort
     from motes.interact.search import search
 
     points, places = _points(x, targets)
+    length = numbers("radius", radius)
+    if length.ndim:
+        raise ValueError(f"radius must be one number, not of shape {length.shape}")
     if not 0 < radius < np.inf:
         raise ValueError(f"radius = {radius} must be above 0 and finite")
     edges = period(box, points.shape[1], points.dtype.type)
@@ -114,9 +127,11 @@ def _pairs(found: Found) -> tuple[NDArray[np.int32], ...]:
 
 def _points(x: ArrayLike, targets: ArrayLike | None) -> tuple[NDArray[Any], NDArray[Any]]:
     """Points and targets as arrays (n, 2) or (n, 3) of one precision."""
-    given = [("x", np.asarray(x))]
+    from motes.interact.cells import numbers
+
+    given = [("x", numbers("x", x))]
     if targets is not None:
-        given.append(("targets", np.asarray(targets)))
+        given.append(("targets", numbers("targets", targets)))
     single = all(array.dtype == np.float32 for _, array in given)
     arrays = []
     for name, array in given:

@@ -21,9 +21,11 @@ from motes.group import Group, named_systems
 from motes.group.capture import CAPTURE
 from motes.group.lasting import Lasting
 from motes.integrate import method
-from motes.interact.arrange import Box, wrapped
+from motes.interact.arrange import Box, wrap, wrapped
+from motes.jit import even_blocks
 from motes.philox import channel
 from motes.record.energy import Matter, Measures, measure
+from motes.repeat import Repeats
 from motes.scene.address import component_address
 from motes.scene.document import Scene, System
 from motes.state import Particles, State
@@ -51,15 +53,22 @@ class Simulation:
         )
         self._steppers = {s.name: self._stepper(s) for s in scene.systems}
         self._groups = self._grouped()
+        grouped = {name for group in self._groups for name in group.steppers}
+        self._alone = {name: name not in grouped for name in sorted(self._steppers)}
+        self._calls = Repeats()
         self._looks = {s.name: Look(s) for s in scene.systems}
         self._systems = {s.name: s for s in scene.systems}
         real = np.float32 if scene.precision == "single" else np.float64
+        self._closed = bool(self._periodic.size.any())
+        self._edges = self._periodic.low.astype(real), self._periodic.size.astype(real)
         self._state = State(0, {}, [Lasting() for _ in self._groups])
         for system in scene.systems:
             compiled = self._steppers[system.name].system
             widths = [(c.address, c.width) for c in compiled.columns]
             moves = compiled.motion.inertial
-            self._state.systems[system.name] = Particles(system.name, real, moves, widths)
+            self._state.systems[system.name] = Particles(
+                system.name, real, moves, widths, compiled.motion.remembers
+            )
         self.work = 0
         """Particle-steps taken so far."""
         self._run(self._lead_in, None)
@@ -257,17 +266,17 @@ class Simulation:
         return (state.number + ahead - self._lead_in) * self.scene.step
 
     def _advance(self, state: State, interval: Interval) -> None:
-        grouped = {name for group in self._groups for name in group.steppers}
-        for name in sorted(state.systems):
+        for name, alone in self._alone.items():
             self.work += state.systems[name].count
-            if name not in grouped:
+            if alone:
                 self._steppers[name].step(state.systems[name], interval)
         for group, memory in zip(self._groups, state.memories, strict=True):
             assert isinstance(memory, Lasting)
             group.step(state.systems, interval, memory)
-        if self._periodic.size.any():
-            for particles in state.systems.values():
-                wrapped(particles.position, self._periodic, particles.count)
+        if self._closed:
+            for name, rows in state.systems.items():
+                head = rows.position, *self._edges
+                self._calls(("wrap", name), wrap, head, even_blocks(rows.count))()
         state.number += 1
 
     def _steps_before(self, time: float) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -75,6 +76,34 @@ def test_lanes_are_numbers_side_by_side() -> None:
         one(x, y, expected, told)
         np.testing.assert_array_equal(found, expected)
         np.testing.assert_array_equal(marks, told)
+
+
+@pytest.mark.parametrize("moves", [True, False])
+def test_marked_lanes_are_packed(
+    moves: bool, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Lanes whose bits are set follow one another, with and without AVX2, as in plain Python."""
+    from motes.machine import target
+
+    monkeypatch.setenv("MOTES_CACHE", str(tmp_path))  # Kept code would be that of this processor.
+    if not moves:
+        monkeypatch.setattr(target, "moves_lanes", lambda: False)
+
+    def pack_some(x: Any, limit: Any, out: Any) -> Any:
+        held = 0
+        for i in range(0, x.size, 8):
+            held += put_some(out, held, take(x, i, 8), take(x, i, 8) < limit)
+        return held
+
+    marked = np.unpackbits(np.arange(256, dtype=np.uint8)).astype(bool)
+    for kind in (np.int32, np.float32, np.float64, np.int64):
+        x = (np.arange(2048) % 40 + np.where(marked, 0, 40)).astype(kind)
+        out = np.zeros(2056, kind)
+        held = compiled(pack_some)(x, kind(40), out)
+        assert held == marked.sum()
+        np.testing.assert_array_equal(out[:held], x[marked])
+    assert (put_some(out, 5, out[0], False), put_some(out, 5, out[0], True)) == (0, 1)
+    assert out[5] == out[0]
 
 
 def test_lanes_go_the_same_way() -> None:

@@ -123,6 +123,30 @@ def test_the_skin_changes_nothing_but_rounding() -> None:
     assert np.abs(ends[0] - ends[2]).max() < 1e-12
 
 
+@pytest.mark.parametrize("share", [0.36, 1.0])
+@pytest.mark.parametrize("also", [0.0, 1.7])
+def test_lists_are_renewed_before_two_that_approach_can_meet(share: float, also: float) -> None:
+    """Two are just outside of what was listed, and come from both sides straight at each other.
+
+    They feel each other in the very step in which they do with lists of that step alone. `share`
+    of the skin is the margin of one and of the other kind of lists; `also` moves both sideways.
+    """
+    ends = []
+    for skin in (0.0, 0.4):
+        law = Cushion(skin=skin, stiffness=4e3)
+        scene = motes.Scene(
+            systems=[motes.System("a")], interact=[law], step=4e-3, precision="double",
+            integrator="leapfrog",
+        )  # fmt: skip
+        sim = motes.Simulation(scene)
+        half = 0.5 * 0.5 * (1 + 0.4 * share) * (1 + 1e-9)
+        sim.place("a", [[-half, 0, 0], [half, 0, 0]], [[0.09, also, 0], [-0.09, also, 0]])
+        sim.run(steps=400)
+        ends.append(sim["a"].position[np.argsort(sim["a"].id)])
+        assert sim["a"].velocity[np.argmax(sim["a"].position[:, 0]), 0] > 0.08
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-12)
+
+
 def test_two_laws_add_up_and_share_lists() -> None:
     """Two cushions of half the stiffness are one; a third of another reach has lists of its own."""
     halves = [Cushion(name="one", stiffness=20.0), Cushion(name="two", stiffness=20.0)]

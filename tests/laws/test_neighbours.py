@@ -1,9 +1,13 @@
 """Neighbour search: what must hold for any points, without looking at how it is done."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
+import motes.errors
 import motes.jit
+import motes.memory
 from motes import neighbours
 from motes.interact.lists import NeighbourList
 
@@ -164,6 +168,12 @@ def test_few_points(n):
         (([[0, 0, 0]], np.nan), "radius = nan must be above 0"),
         (([[0, 0, 0]], 1.0, (1.0, 2.0)), "box must be one length or 3"),
         (([[0, 0, 0]], 1.0, -1.0), "edges above 0"),
+        (([[0, 0, 0]], 1.0, np.nan), "edges above 0"),
+        (([[0, 0, 0]], "wide"), "radius must be an array of real numbers"),
+        (([[0, 0, 0]], [1.0, 2.0]), r"radius must be one number, not of shape \(2,\)"),
+        (([[0, 0, 0], [1, 2]], 1.0), "x must be an array of real numbers, all rows as long"),
+        (([[0j, 0, 0]], 1.0), "x must be an array of real numbers"),
+        ((None, 1.0), "x must be an array of real numbers"),
     ],
 )
 def test_bad_points_are_named(arguments, message):
@@ -176,8 +186,63 @@ def test_bad_targets_are_named():
         neighbours.within(np.zeros((2, 3)), 1.0, [[np.nan, 0, 0]])
     with pytest.raises(ValueError, match="as many coordinates"):
         neighbours.within(np.zeros((2, 3)), 1.0, np.zeros((2, 2)))
-    with pytest.raises(ValueError, match="k = 0"):
-        neighbours.nearest(np.zeros((2, 3)), 0)
+    for k, message in ((0, "at least 1"), (2.5, "a whole number"), ("few", "a whole number")):
+        with pytest.raises(ValueError, match=f"k = {k!r} must be {message}"):
+            neighbours.nearest(np.zeros((2, 3)), k)
+
+
+def test_what_would_not_fit_is_refused_before_it_is_allocated(monkeypatch):
+    """10 000 points at one place are 5e7 pairs, 0.2 GB; 1e8 nearest of each, 8 TB."""
+    monkeypatch.setattr(motes.memory, "_budget", 50 << 20)
+    with pytest.raises(motes.errors.MemoryBudgetError, match="a list of neighbours would need"):
+        neighbours.pairs(np.ones((10_000, 3)), 1.0)
+    with pytest.raises(motes.errors.MemoryBudgetError, match="100000000 nearest of 10000 places"):
+        neighbours.nearest(np.ones((10_000, 3)), 10**8)
+
+
+@pytest.mark.parametrize("box", [None, 1e9])
+def test_empty_space_costs_nothing(cloud, box):
+    """20 000 points in a cube of 1e6 radii or more: no more memory than some hundred bytes each."""
+    far = cloud * 1e9
+    tracemalloc.start()
+    try:
+        assert len(neighbours.pairs(far, 1e3, box)[0]) == 0
+        index, distance = neighbours.nearest(far, 2, box)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 400 * len(far)
+    near, apart = neighbours.nearest(cloud, 2, box and 1.0)
+    np.testing.assert_array_equal(index, near)
+    np.testing.assert_allclose(distance, apart * 1e9, rtol=1e-7)
+
+
+def test_a_dense_clump_in_wide_space():
+    """Pairs within the clump, and the nearest of who is alone, as in the clump and space apart."""
+    rng = np.random.default_rng(4)
+    clump, wide = rng.random((3_000, 3)) * 1e-4, rng.random((3_000, 3)) * 100 + 1.0
+    x = np.concatenate([clump, wide])
+    found = neighbours.pairs(x, 1e-5)
+    np.testing.assert_array_equal(found, neighbours.pairs(clump, 1e-5))
+    assert len(found[0]) > 1_000
+    index, distance = neighbours.nearest(x, 3)
+    inner = neighbours.nearest(clump, 3)
+    np.testing.assert_array_equal(index[:3_000], inner[0])
+    np.testing.assert_array_equal(distance[:3_000], inner[1])
+
+
+def test_places_of_others_are_wrapped_into_the_box_like_points(cloud):
+    """Targets a whole number of periods away find the same points."""
+    targets = cloud[:50] + 1e-3
+    whole = np.array([1.0, -2.0, 3.0])
+    index, distance = neighbours.nearest(cloud, 4, box=1.0, targets=targets)
+    away = neighbours.nearest(cloud, 4, box=1.0, targets=targets + whole)
+    np.testing.assert_array_equal(away[0], index)
+    np.testing.assert_allclose(away[1], distance, atol=1e-14)
+    i, j = neighbours.within(cloud, float(distance.max()), targets, box=1.0)
+    assert set(zip(np.repeat(np.arange(50), 4), index.ravel(), strict=True)) <= set(
+        zip(i.tolist(), j.tolist(), strict=True)
+    )
 
 
 @pytest.mark.parametrize("half", [False, True])
@@ -241,3 +306,21 @@ def test_a_list_is_stale_before_it_is_built_and_after_births():
     x[7, 1] = np.nan
     with pytest.raises(ValueError, match=r"x\[7\]"):
         neighbours_of.stale(x)
+
+
+@pytest.mark.parametrize("keys", [3, 700, 5000])
+def test_rows_are_counted_into_order(keys: int) -> None:
+    """Stable order by whole keys: that of NumPy's, with where each key begins; a room serves again
+    for fewer and for more."""
+    from motes.interact.counting_sort import Room, counted_rows, sorted_rows
+
+    room: Room = {}
+    for n in (1, 2, 1237, 40, 3001):
+        key = np.random.default_rng(n).integers(0, keys, n).astype(np.uint64)
+        expected = np.argsort(key, kind="stable")
+        found, row, first = counted_rows(key, keys, room)
+        np.testing.assert_array_equal(row, expected)
+        np.testing.assert_array_equal(found, key[expected])
+        np.testing.assert_array_equal(first, np.searchsorted(key[expected], np.arange(keys + 1)))
+        found, row = sorted_rows(key, 13)
+        np.testing.assert_array_equal(row, expected)

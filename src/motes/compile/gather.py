@@ -134,7 +134,7 @@ class Gathering:
         widest = f"max({', '.join(most)})" if len(most) > 1 else most[0]
         lines = (
             "@kernel\ndef gather(numbers, targets, slot, key, along, sources, grid, cells, "
-            "begin, end, run, shift, pick, hold, goes_on, ends, kept, order, push):\n"
+            "begin, end, run, shift, ramp, pick, hold, goes_on, ends, kept, order, push):\n"
             f"{numbers}{prelude}    reach = {widest}\n"
             f"    limit, wide = reach * reach * F({1 + CAUTION}), reach * F({WIDE})\n"
         )
@@ -145,7 +145,7 @@ class Gathering:
             f"        stop = same_row(i, end, key, uint64(along), t_x, wide, {lanes})\n"
             "        low, high = bounds(t_x, t_y, t_z, i, stop)\n"
             "        number, points = runs_near(low, high, reach, grid, cells, run, shift)\n"
-            "        if number > run.shape[0] or points > pick.size:\n"
+            f"        if number > run.shape[0] or points > pick.size - {lanes}:\n"
             "            return i, max(number, points)\n"
             f"        me = take(slot, i, {lanes})\n"
         )
@@ -154,7 +154,8 @@ class Gathering:
         lines += (
             "            dx, dy, dz = shift[r, 0], shift[r, 1], shift[r, 2]\n"
             "            places = (s_x, s_y, s_z)\n"
-            "            r, held = choose(places, low, high, limit, r, number, run, shift, pick)\n"
+            "            r, held = choose(places, low, high, limit, r, number, run, shift, ramp, "
+            "pick)\n"
         )
         lines += "".join(f"            o_{n} = settled(a_{n} - d{n})\n" for n in AXES)
         lines += "            for e in range(held):\n                k = pick[e]\n"

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.catalog import Component
-from motes.catalog.source import function_node
+from motes.catalog.source import fields_read, function_node
 from motes.compile.text import AXES, STATE, Text, packed
 from motes.control.constant import Constant, Setting
 from motes.errors import SceneError
@@ -48,6 +48,7 @@ class Law:
         self._time = float("nan")
         self._values_now: dict[tuple[str, str], dict[str, Any]] = {}
         self._numbers_now: dict[Any, NDArray[Any]] = {}
+        self._reach: tuple[dict[str, Any], float] | None = None
         self._missing()
 
     def _missing(self) -> None:
@@ -98,7 +99,10 @@ class Law:
 
     def reach(self, time: float) -> float:
         """Support radius at a time [m]."""
-        return float(self._kernel("reach")(SimpleNamespace(**self.values(time))))
+        values = self.values(time)
+        if self._reach is None or self._reach[0] is not values:
+            self._reach = values, float(self._kernel("reach")(SimpleNamespace(**values)))
+        return self._reach[1]
 
     @cached_property
     def _fields(self) -> dict[str, int]:
@@ -144,15 +148,7 @@ class Law:
 
     def _read(self, function: Callable[..., Any], argument: int) -> set[str]:
         """What a kernel reads of its argument; all that there is where it passes it on."""
-        node = function_node(getattr(function, "py_func", function))
-        name = node.args.args[argument].arg
-        parents = [n for n in ast.walk(node) if isinstance(n, ast.Attribute)]
-        read = {n.attr for n in parents if isinstance(n.value, ast.Name) and n.value.id == name}
-        inside = {id(n.value) for n in parents}
-        whole = any(
-            isinstance(n, ast.Name) and n.id == name and id(n) not in inside for n in ast.walk(node)
-        )
-        return read | ({*STATE, *self.part.needs} if whole else set())
+        return fields_read(function, argument, {*STATE, *self.part.needs})
 
     # ------------------------------------------------------------------ kernels
 
@@ -246,7 +242,7 @@ class Writer:
         own, sums = self.own, range(width)
         other = tuple(n for n in self.other if n not in AXES)
         lines = (
-            f"@kernel\ndef sweep_{what}(numbers, targets, records, sources, limit, out, "
+            f"@kernel\ndef sweep_{what}(numbers, targets, records, sources, limit, fresh, out, "
             "begin, first, entry, longest):\n"
             f"    room = empty(({len(other) + 3}, longest), F)\n"
             f"    p = {self.p()}\n    quarter = F(0.25) * limit\n"
@@ -288,7 +284,10 @@ class Writer:
             lines += "            w = F(1.0) if near else F(0.0)\n"
             lines += f"            {term}"
             lines += "".join(f"            sum{j} += n{j} * w\n" for j in sums)
-        lines += "".join(f"        out[{j}, i] += sum{j}\n" for j in sums)
+        lines += "        if fresh:\n"
+        lines += "".join(f"            out[{j}, i] = sum{j}\n" for j in sums)
+        lines += "        else:\n"
+        lines += "".join(f"            out[{j}, i] += sum{j}\n" for j in sums)
         self.text.add(lines)
 
     def finish(self, width: int) -> None:

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from motes.catalog import Component
 from motes.compile.text import Text, packed
@@ -67,6 +70,18 @@ class Surfaces:
             for key, control in solid.values.items()
             if control.scope != "fixed" and key != "color"
         )
+
+
+def kernel_of_solids(
+    solids: Sequence[tuple[str, Component]], name: str, source: str
+) -> tuple[Any, Any]:
+    """A kernel in double precision whose text calls `solids` and `solid_0` ..., and the numbers K
+    that it is called with."""
+    text = Text("double")
+    write_surfaces(text, solids)
+    text.add(source)
+    text.add(text.values.scene_text())
+    return text.module()[name], text.values.arrays(np.float64)
 
 
 def write_surfaces(

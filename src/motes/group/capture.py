@@ -8,13 +8,15 @@ simulation are kept: instant, place, and both ids.
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motes.catalog import Component
+from motes.errors import SceneError
+from motes.group.partners import Interactions, named
 from motes.jit import EXACT, jit
 from motes.philox import channel, draw, uniform_double
 from motes.state import Particles
@@ -23,6 +25,10 @@ CAPTURE = np.dtype(
     [("time", float), ("hunter", np.uint64), ("prey", np.uint64), ("place", float, 3)]
 )
 """One capture: scene time [s], ids of both, and where [m]."""
+
+
+NOBODY: NDArray[np.int64] = np.zeros(0, np.int64)
+"""No rows."""
 
 
 class Animals(NamedTuple):
@@ -38,8 +44,12 @@ class Animals(NamedTuple):
 class Captures:
     """The laws of captures of one group, and what they have caught."""
 
-    def __init__(self, laws: Sequence[tuple[str, Component]]) -> None:
-        self.laws = tuple(laws)
+    def __init__(self, laws: Interactions, systems: Iterable[str]) -> None:
+        self.laws = laws
+        for _, law in laws:
+            if not law.values["hunters"].document():
+                raise SceneError(f'interaction "{law.name}": hunters must name who catches.')
+            named(law, "hunters", systems)
         self.caught: dict[str, NDArray[np.int64]] = {}
         """Rows caught in the last step, by system."""
         self.kept: list[NDArray[Any]] = []
@@ -47,7 +57,7 @@ class Captures:
 
     def rows(self, name: str) -> NDArray[np.int64]:
         """Rows of a system that were caught in the step."""
-        return self.caught.get(name, np.zeros(0, np.int64))
+        return self.caught.get(name, NOBODY)
 
     def find(
         self,
@@ -58,11 +68,13 @@ class Captures:
         values: Callable[[Component, float], Any],
     ) -> None:
         """Find who is caught at the end of an interval [s]; of several laws the first has it."""
+        if not self.laws:
+            return
         self.caught = {}
         begin, end = interval
         animals = {
             name: Animals(name, systems[name].position[:, :n], systems[name].ids[:n])
-            for name, n in (alive.items() if self.laws else ())
+            for name, n in alive.items()
         }
         for address, law in self.laws:
 

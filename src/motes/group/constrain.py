@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.catalog import Component
-from motes.compile.surfaces import write_surfaces
-from motes.compile.text import Text
+from motes.compile.surfaces import kernel_of_solids
 from motes.interact.crowd.avoid import Walls
 from motes.jit import blocks, share
 
@@ -55,11 +54,8 @@ class Ground:
     def __init__(self, solids: tuple[tuple[str, Component], ...]) -> None:
         self._kernel, self.most = None, min(len(solids), MOST)
         if solids:
-            text = Text("double")
-            write_surfaces(text, solids)
-            text.add(_walls_text(len(solids)))
-            text.add(text.values.scene_text())
-            self._kernel, self._K = text.module()["walls"], text.values.arrays(np.float64)
+            text = _walls_text(len(solids))
+            self._kernel, self._K = kernel_of_solids(solids, "walls", text)
 
     def walls(
         self, time: float, position: Array, radius: Array, horizon: float, reach: float

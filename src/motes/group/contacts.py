@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.catalog import Component
-from motes.compile.surfaces import write_surfaces
-from motes.compile.text import Text
+from motes.compile.surfaces import kernel_of_solids
 from motes.jit import blocks, each
 
 MOST = 6
@@ -39,11 +38,7 @@ class Contacts:
         hard = tuple(pair for pair in solids if pair[1].values["collides"].document())
         self._kernel, self.most = None, min(len(hard), MOST)
         if hard:
-            text = Text("double")
-            write_surfaces(text, hard)
-            text.add(_text(len(hard)))
-            text.add(text.values.scene_text())
-            self._kernel, self._K = text.module()["contacts"], text.values.arrays(np.float64)
+            self._kernel, self._K = kernel_of_solids(hard, "contacts", _text(len(hard)))
 
     def near(self, position: NDArray[Any], reach: float, time: float) -> Planes:
         """Solids within `reach` [m] of positions (3, n) [m] at a time, as planes."""

@@ -18,15 +18,22 @@ from motes.errors import SceneError
 from motes.group.capture import Captures
 from motes.group.constrain import Constraints, Ground
 from motes.group.contacts import Contacts, Planes
+from motes.group.implicit import backward_difference, one_by_one, together
 from motes.group.lasting import Body, Lasting
 from motes.group.members import Bodies, Member, Movers, Occasion
-from motes.group.methods import implicit_stages, runge_kutta, split
+from motes.group.methods import nystrom, runge_kutta, split
 from motes.group.nearby import Nearby
 from motes.group.partners import Interactions, having, kernel, named, partners, values
+from motes.group.rosenbrock import rosenbrock
 from motes.interact.arrange import Box
 from motes.state import Particles
 from motes.step import Interval, Stepper
-from motes.tableau import Implicit, Splitting
+from motes.tableau import BackwardDifference, Explicit, Nystrom, Rosenbrock, Splitting
+
+NOTHING: dict[Any, NDArray[Any]] = {
+    real: np.zeros((3, 0), real) for real in (np.float32, np.float64)
+}
+"""No push, by type of numbers."""
 
 
 class Group:
@@ -47,9 +54,10 @@ class Group:
         self._local = having(interactions, "reach")
         laws = having(interactions, "velocities")
         self.constraints = Constraints(laws, Ground(solids if laws else ()))
-        self.captures = Captures(having(interactions, "captures"))
+        self.captures = Captures(having(interactions, "captures"), steppers)
         self.contacts = Contacts(solids if self.exchanges else ())
         self._strict, self._periodic = strict, periodic
+        self._members: dict[str, Member] = {}
         self.nearby = self._nearby(precision)
         motions = [stepper.system.motion for stepper in steppers.values()]
         self.method = motions[0].method
@@ -60,6 +68,16 @@ class Group:
             raise SceneError(
                 f'{who} by "{laws[0][1].name}", a law of velocities, which holds between kick and '
                 'drift: choose integrator = "semi_implicit_euler" or another splitting method.'
+            )
+        if isinstance(self.method, Nystrom) and self.nearby.depends_on_velocity:
+            raise SceneError(
+                f"{who} by a law that depends on velocities, and nystrom5 is for forces that "
+                "follow from place and time alone. Choose rk4 or dopri5."
+            )
+        if isinstance(self.method, Rosenbrock) and any(motion.limits for motion in motions):
+            raise SceneError(
+                f"{who}, and a limit bounds the sum of all forces, which rodas4 takes apart. "
+                "Choose radau5 or kencarp4."
             )
         if not all(motion.inertial for motion in motions):
             raise SceneError(f"{who} and must have velocities: give them a force besides flows.")
@@ -85,44 +103,65 @@ class Group:
         kept = {name: (alive[name], systems[name].deaths) for name in alive}
         if memory.kept != kept:
             memory.kept, memory.push = kept, None
-        self.nearby.settle(self._bodies(systems, alive, interval.begin), memory)
-        members = {name: self._member(name, systems[name], alive[name]) for name in alive}
-        if isinstance(self.method, Splitting):
-            split(self, members, interval, self.method, memory)
-        elif isinstance(self.method, Implicit):
-            implicit_stages(self, members, interval, self.method, memory)
-        else:
-            runge_kutta(self, members, interval, self.method, memory)
+        begin = partial(self._bodies, systems, alive, interval.begin)
+        self.nearby.settle(kept, begin, memory)
+        members = {name: self._member(name, systems[name], alive[name], memory) for name in alive}
+        self._integrate(members, interval, memory)
         for name, stepper in self.steppers.items():
             if stepper.system.surfaces is not None:
                 if stepper.rebounds(systems[name], members[name].y, alive[name], interval):
                     memory.push = None
-                systems[name].motion[:, : alive[name]] = members[name].y
+                systems[name].motion[:, : alive[name]] = members[name].y[:, : alive[name]]
         for address, part in self.exchanges:
             self._exchange(address, part, members, interval, memory)
         seed = next(iter(self.steppers.values())).seed
         span = (interval.begin, interval.end)
         self.captures.find(systems, span, seed, alive, values)
         for name, stepper in self.steppers.items():
-            newborn = np.arange(alive[name], systems[name].count)
-            stepper.exceptions(systems[name], newborn, interval)
+            rows = systems[name]
+            if rows.count > alive[name]:
+                stepper.exceptions(rows, np.arange(alive[name], rows.count), interval)
             stepper.events()
-            rows, caught = systems[name], self.captures.rows(name)
-            stepper.deaths(rows, np.arange(rows.count), interval, caught)
+            caught = self.captures.rows(name)
+            if caught.size or stepper.system.motion.mortal:
+                stepper.deaths(rows, np.arange(rows.count), interval, caught)
+
+    def _integrate(self, members: dict[str, Member], interval: Interval, memory: Lasting) -> None:
+        """Take the states of all members from the step's begin to its end."""
+        method = self.method
+        if isinstance(method, Splitting):
+            split(self, members, interval, method, memory)
+        elif isinstance(method, Explicit):
+            runge_kutta(self, members, interval, method, memory)
+        elif isinstance(method, Nystrom):
+            nystrom(self, members, interval, method, memory)
+        elif isinstance(method, BackwardDifference):
+            backward_difference(self, members, interval, method, memory)
+        elif isinstance(method, Rosenbrock):
+            rosenbrock(self, members, interval, method, memory)
+        else:
+            (one_by_one if method.diagonal else together)(self, members, interval, method, memory)
 
     def _bodies(
         self, systems: dict[str, Particles], alive: dict[str, int], time: float
     ) -> dict[str, Body]:
         found = {}
         for name, stepper in self.steppers.items():
-            rows, n = systems[name], alive[name]
-            found[name] = Body(stepper, rows, n, rows.position[:, :n], rows.velocity[:, :n], time)
+            rows = systems[name]
+            found[name] = Body(stepper, rows, alive[name], rows.motion, time)
         return found
 
-    def _member(self, name: str, rows: Particles, alive: int) -> Member:
+    def _member(self, name: str, rows: Particles, alive: int, memory: Lasting) -> Member:
         stepper = self.steppers[name]
-        y = rows.motion if stepper.system.surfaces is None else rows.motion[:, :alive].copy()
-        return Member(stepper, rows, alive, y, np.zeros((3, 0), rows.real))
+        flies = stepper.system.surfaces is not None
+        member, push = self._members.get(name), memory.pushes.get(name, NOTHING[rows.real])
+        if member is None or not member.fits(rows, alive):
+            y = np.empty_like(rows.motion) if flies else rows.motion
+            member = self._members[name] = Member(stepper, rows, alive, y, push)
+        if flies:
+            member.y[:, :alive] = rows.motion[:, :alive]
+        member.push = push
+        return member
 
     def interact(self, members: dict[str, Member], time: float, memory: Lasting) -> None:
         """Give every member the push of the interactions at a time.
@@ -139,7 +178,7 @@ class Group:
     def _pushes(
         self, members: dict[str, Member], time: float, memory: Lasting
     ) -> dict[str, NDArray[Any]]:
-        pushes = {name: np.zeros((3, m.alive), m.y.dtype) for name, m in members.items()}
+        pushes = {name: memory.pushed(name, m.alive, m.y.dtype) for name, m in members.items()}
         if self.interactions:
             bodies = []
             for name, m in members.items():
@@ -182,6 +221,8 @@ class Group:
         when = Occasion(interval.length, memory.steps, address, seed, self._periodic, planes)
         if kernel(part, "exchange")(p, movers, when):
             memory.push = None
+            for name in chosen:
+                members[name].rows.forget(slice(0, members[name].alive))
 
     def energy(self, systems: dict[str, Particles], time: float) -> float:
         """Potential energy [J] of the interactions that define one."""

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from motes.compile.pairs import Law
+from motes.compile.text import AXES
 from motes.control.curve import Curve
 from motes.interact.arrange import Arranged, Box
 from motes.interact.clusters import Clusters
@@ -17,29 +20,42 @@ from motes.jit import Calls
 from motes.state import Particles
 from motes.step import Stepper
 
+Kept = dict[str, tuple[int, int]]
+"""Rows and deaths by system: as long as they are the same, so are the particles."""
+
 CAUTION = 1 - 2.0**-10
 """Share of the allowed way after which a list is stale: more than rounding takes away."""
 
 
-SHORT = 0.4
+SHORT = 0.36
 """Margin of the lists of particles as a share of that of the lists of clusters."""
 
 
 @dataclass
 class Body:
-    """One system of a group at one stage: `position`, `velocity` (3, n) [m, m/s], its traits."""
+    """One system of a group at one stage."""
 
     stepper: Stepper
     rows: Particles
     alive: int
-    position: NDArray[Any]
-    velocity: NDArray[Any]
+    motion: NDArray[Any]
+    """(6, at least n) positions and velocities [m, m/s]."""
     time: float = 0.0
 
     @property
     def name(self) -> str:
         """Name of the system."""
         return self.rows.name
+
+    @property
+    def position(self) -> NDArray[Any]:
+        """Positions (3, n) [m]."""
+        return self.motion[:3, : self.alive]
+
+    @property
+    def velocity(self) -> NDArray[Any]:
+        """Velocities (3, n) [m/s]."""
+        return self.motion[3:, : self.alive]
 
     @property
     def mass(self) -> NDArray[Any]:
@@ -68,7 +84,7 @@ class Lists:
     arranged: dict[str, Arranged]
     near: dict[tuple[str, str], list[Clusters]]
     """Lists of clusters by target and source."""
-    kept: dict[str, tuple[int, int]]
+    kept: Kept
     """Rows and deaths for which they hold."""
     step: int = 0
     """Number of the step in which they were built."""
@@ -91,8 +107,10 @@ class Lasting:
     lists: list[Lists | None] = field(default_factory=list)
     push: dict[str, NDArray[Any]] | None = None
     """Accelerations (3, n) of all systems at `time`, while nothing has moved since."""
+    pushes: dict[str, NDArray[Any]] = field(default_factory=dict)
+    """Where they are written."""
     time: float = 0.0
-    kept: dict[str, tuple[int, int]] = field(default_factory=dict)
+    kept: Kept = field(default_factory=dict)
     builds: int = 0
     """How often lists were built."""
     untidy: set[str] = field(default_factory=set)
@@ -103,9 +121,21 @@ class Lasting:
     """Memory of lists that nobody else holds: those that replace them may be written there."""
 
     def copy(self) -> Lasting:
-        """A copy that shares arrays, which are replaced and not written to from now on."""
+        """A copy with its own pushes; it shares the arrays of lists, which are replaced and not
+        written to from now on."""
         self.rooms = {}
-        return replace(self, lists=list(self.lists), untidy=set(self.untidy), rooms={})
+        push = self.push and {name: array.copy() for name, array in self.push.items()}
+        return replace(
+            self, lists=list(self.lists), untidy=set(self.untidy), rooms={}, push=push, pushes={}
+        )
+
+    def pushed(self, name: str, alive: int, real: Any) -> NDArray[Any]:
+        """Room for a system's accelerations (3, alive), filled with 0."""
+        room = self.pushes.get(name)
+        if room is None or room.shape[1] != alive:
+            room = self.pushes[name] = np.empty((3, alive), real)
+        room.fill(0)
+        return room
 
     def arrays(self) -> Iterator[NDArray[Any]]:
         """Everything that can change the next bit."""
@@ -122,18 +152,28 @@ class Class:
 
     laws: list[tuple[Law, tuple[str, ...], tuple[str, ...]]]
 
-    @property
+    @cached_property
     def pairs(self) -> list[tuple[str, str]]:
         """Targets and sources for which lists are needed."""
         found = {(a, b) for _, targets, sources in self.laws for a in targets for b in sources}
         return sorted(found)
 
-    @property
+    @cached_property
     def systems(self) -> list[str]:
         """Systems that take part."""
         return sorted({name for pair in self.pairs for name in pair})
 
-    @property
+    @cached_property
+    def fields(self) -> dict[str, list[str]]:
+        """What is read of every system besides its places."""
+        wanted: dict[str, set[str]] = {name: set() for name in self.systems}
+        for law, targets, sources in self.laws:
+            for names, fields in zip((targets, sources), law.fields, strict=True):
+                for name in names:
+                    wanted[name] |= set(fields)
+        return {name: sorted(fields - set(AXES)) for name, fields in wanted.items()}
+
+    @cached_property
     def every(self) -> int:
         """Steps between builds of lists, 0 where they follow from how far particles go."""
         return min(law.rebuild for law, _, _ in self.laws)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from motes.group.contacts import Planes
 from motes.group.lasting import Body
 from motes.interact.arrange import Box
-from motes.jit import blocks, each
+from motes.jit import even_blocks
+from motes.repeat import Repeats
 from motes.state import Particles
 from motes.step import Stepper
-
-BLOCK = 1 << 15
-"""Rows of one kernel call."""
 
 
 @dataclass(frozen=True)
@@ -71,16 +69,23 @@ class Member:
     """The particles' own positions and velocities, or a copy where a flight has to be kept."""
     push: NDArray[Any]
 
-    def each(self, name: str, *arguments: Any) -> None:
+    def __post_init__(self) -> None:
+        self._calls, self._parts = Repeats(), even_blocks(self.alive)
+        self._motion = self.rows.motion
+
+    def fits(self, rows: Particles, alive: int) -> bool:
+        """Whether it is about these rows, in the same arrays."""
+        return self.rows is rows and self.alive == alive and self._motion is rows.motion
+
+    def each(self, name: str, *arguments: Any, numbers: Sequence[float]) -> None:
         """Run one of the system's staged kernels over all rows that were alive."""
-        kernel = self.stepper.system.staged(name)
-        columns, parts = (self.rows.birth, self.rows.columns), blocks(self.alive, BLOCK)
-        each(kernel, (self.y, *columns, self.push, *arguments), parts)
+        kernel, rows = self.stepper.system.staged(name), self.rows
+        head = self.y, rows.birth, rows.columns, self.push, *arguments
+        self._calls(name, kernel, head, self._parts)(*numbers)
 
     def body(self, time: float) -> Body:
         """The system as laws of limited reach see it."""
-        x, v = self.y[:3, : self.alive], self.y[3:, : self.alive]
-        return Body(self.stepper, self.rows, self.alive, x, v, time)
+        return Body(self.stepper, self.rows, self.alive, self.y, time)
 
     @property
     def K(self) -> Any:

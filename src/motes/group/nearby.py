@@ -7,35 +7,25 @@ particles' ways do not fit into it any more (Verlet, Physical Review 159 (1967) 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from motes.compile.pairs import FORCE, POTENTIAL, VIRIAL, Law
-from motes.compile.text import AXES
 from motes.errors import SceneError, SimulationError
-from motes.group.lasting import Body, Class, Lasting, Lists
+from motes.group.lasting import Body, Class, Kept, Lasting, Lists
+from motes.group.sums import RECORDS, Call, Packed, Places, Plan, Sums
 from motes.group.swarm import Swarm
-from motes.interact.arrange import Box, Packing, arrange, common_grid, wrapped
+from motes.interact.arrange import Box, arrange, common_grid, wrapped
 from motes.interact.clusters import Room, cluster_lists, particle_lists
-from motes.jit import Calls, blocks, each
-from motes.memory import allocate
+from motes.jit import Calls
 
 ALIKE = 1.5
 """Ratio of reaches up to which laws share lists."""
-
-RECORDS = "records"
-"""Name of the places of all slots, x, y, z and a fourth number that nobody reads."""
-
-ROWS = 1 << 15
-"""Rows of one task of a loop that is quick."""
-
-
-Packed = dict[str, dict[str, NDArray[Any]]]
-"""Columns by system and name, in the order of slots."""
 
 
 class Nearby:
@@ -61,7 +51,8 @@ class Nearby:
             if first is None or not alike or first.reach(0.0) > ALIKE * one[0].reach(0.0):
                 self.classes.append(Class([]))
             self.classes[-1].laws.append(one)
-        self._room: dict[Any, NDArray[Any]] = {}
+        self._sums = Sums(real, self.periodic)
+        self._plans: dict[int, Plan] = {}
         for law, _, _ in self.laws:
             if message := self._too_long(law, 0.0):
                 raise SceneError(message)
@@ -77,7 +68,7 @@ class Nearby:
             )
         return f"{law.owner}: its reach {reach:g} m must be above 0 m."
 
-    @property
+    @cached_property
     def depends_on_velocity(self) -> bool:
         """Whether any law reads velocities."""
         return any(law.depends_on_velocity for law, _, _ in self.laws)
@@ -88,23 +79,24 @@ class Nearby:
 
     # ------------------------------------------------------------------ lists
 
-    def settle(self, bodies: dict[str, Body], memory: Lasting) -> None:
+    def settle(self, kept: Kept, begin: Callable[[], dict[str, Body]], memory: Lasting) -> None:
         """Bring rows into the order of cells, before the stages of a step.
 
-        Lists that do not hold any more, since particles were born or have died, are built anew.
+        `kept` says which particles there are, `begin` where. Lists that do not hold any more, since
+        some were born or have died, are built anew.
         """
         for name in sorted(memory.untidy):
-            self._tidy(name, bodies[name], memory)
+            self._tidy(name, begin()[name], memory)
         memory.untidy = set()
         memory.lists = memory.lists or [None] * len(self.classes)
         memory.steps += 1
-        for k, shared in enumerate(self.classes):
-            if not _holds(memory.lists[k], shared.systems, bodies):
-                self._build(k, bodies, memory, memory.steps - 1)
+        for k in range(len(self.classes)):
+            if not _holds(memory.lists[k], kept):
+                self._build(k, begin(), memory, memory.steps - 1)
         moved: set[str] = set()
         for k, found in enumerate(memory.lists):
             if found is not None and not found.settled:
-                self._reorder(k, set(found.arranged) - moved, bodies, memory)
+                self._reorder(k, set(found.arranged) - moved, begin(), memory)
                 moved |= set(found.arranged)
 
     def _tidy(self, name: str, body: Body, memory: Lasting) -> None:
@@ -114,7 +106,7 @@ class Nearby:
         order = self.swarm.order(body)
         body.rows.reorder(order)
         if memory.push is not None:
-            memory.push = {**memory.push, name: memory.push[name][:, order]}
+            memory.push[name][:] = memory.push[name][:, order]
 
     def _reorder(self, k: int, names: set[str], bodies: dict[str, Body], memory: Lasting) -> None:
         """Move rows into the order of one class's cells; all lists keep telling where they are."""
@@ -131,7 +123,7 @@ class Nearby:
                     there = there._replace(order=place[there.order])
                     memory.lists[i] = replace(other, arranged={**other.arranged, name: there})
             if memory.push is not None:
-                memory.push = {**memory.push, name: memory.push[name][:, order]}
+                memory.push[name][:] = memory.push[name][:, order]
         settled = memory.lists[k]
         assert settled is not None
         memory.lists[k] = replace(settled, settled=True)
@@ -187,24 +179,42 @@ class Nearby:
             self.swarm.push(bodies, pushes, memory.untidy)
         memory.lists = memory.lists or [None] * len(self.classes)
         for k, shared in enumerate(self.classes):
-            time = next(iter(bodies.values())).time
-            for law, _, _ in shared.laws:
-                if message := self._too_long(law, time):
-                    raise SimulationError(message)
-            found, packed = self._current(k, bodies, memory, time)
-            for law, targets, sources in shared.laws:
-                self._push(law, targets, sources, time, found, packed, pushes)
+            plan, found = self._plans.get(k), memory.lists[k]
+            if plan is not None and found is not None and plan.fits(found, bodies, pushes):
+                _, since = plan.places()
+                if shared.good(found, since, plan.time, memory.steps):
+                    plan.sums()
+                    continue
+            self._push(k, bodies, pushes, memory)
+
+    def _push(
+        self, k: int, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting
+    ) -> None:
+        """Add what the laws of a class give, and keep how it was done while nothing changes."""
+        shared, time = self.classes[k], next(iter(bodies.values())).time
+        for law, _, _ in shared.laws:
+            if message := self._too_long(law, time):
+                raise SimulationError(message)
+        found, places = self._current(k, bodies, memory, time)
+        sums: list[Call] = []
+        for law, targets, sources in shared.laws:
+            sums += self._sums.pushing(law, targets, sources, time, found, places.packed, pushes)
+        plan = Plan(found, places, sums, time, bodies, pushes)
+        plan.sums()
+        if places.lasting and all(law.lasting for law, _, _ in shared.laws):
+            self._plans[k] = plan
 
     def _current(
         self, k: int, bodies: dict[str, Body], memory: Lasting, time: float
-    ) -> tuple[Lists, Packed]:
+    ) -> tuple[Lists, Places]:
         """Lists of a class that miss no pair now, built or shortened anew where they must be."""
         shared, found = self.classes[k], memory.lists[k]
         radius = 0.0
-        if found is not None and _holds(found, shared.systems, bodies):
-            packed, moved, since = self._packed(shared, found, bodies)
+        if found is not None and _holds(found, {name: _kept(bodies[name]) for name in bodies}):
+            places = self._sums.places(shared, found, bodies)
+            moved, since = places()
             if shared.good(found, since, time, memory.steps):
-                return found, packed
+                return found, places
             radius = shared.short_radius(found, moved, time)
             if not found.short and (shared.every or not moved):
                 radius = radius or found.radius  # They were built for this very place or step.
@@ -212,95 +222,13 @@ class Nearby:
             self._build(k, bodies, memory, memory.steps)
             found = memory.lists[k]
             assert found is not None
-            packed, _, _ = self._packed(shared, found, bodies)
+            places = self._sums.places(shared, found, bodies)
+            places()
             radius = shared.short_radius(found, 0.0, time) or found.radius
         assert found is not None
         rooms = memory.rooms.setdefault((k,), {})
-        found = memory.lists[k] = self._chosen(shared, found, packed, radius, rooms)
-        return found, packed
-
-    def _packed(
-        self, shared: Class, found: Lists, bodies: dict[str, Body]
-    ) -> tuple[Packed, float, float]:
-        """What the laws read of every system in the order of slots; how far one has moved since the
-        lists were built, and since they were shortened [m].
-
-        Places come as records (slots + 1, 4), and, as the columns of these, one by one.
-        """
-        wanted: dict[str, set[str]] = {name: set() for name in shared.systems}
-        for law, targets, sources in shared.laws:
-            own, other = law.fields
-            for name in targets:
-                wanted[name] |= set(own)
-            for name in sources:
-                wanted[name] |= set(other)
-        packed: Packed = {}
-        moved = np.zeros(2)
-        for name, body in bodies.items():
-            if name not in wanted:
-                continue
-            packing = Packing(found.arranged[name], self.periodic)
-            size = found.arranged[name].slots + 1
-            records = self._space((name, "x"), (size, 4))
-            mark = found.marks.get(name)
-            moved = np.maximum(moved, packing.positions(body.position, records, mark))
-            columns = {RECORDS: records, **dict(zip(AXES, records.T, strict=False))}
-            for field_ in sorted(wanted[name] - set(columns)):
-                kept = found.columns.get((name, field_))
-                if kept is None:
-                    lasts = body.lasts(field_)
-                    room = (
-                        np.empty(size, self.real) if lasts else self._space((name, field_), (size,))
-                    )
-                    packing.values(body.column(field_), room)
-                    kept = room
-                    if lasts:
-                        found.columns[name, field_] = room
-                columns[field_] = kept
-            packed[name] = columns
-        built, shortened_ = np.sqrt(moved).tolist()
-        return packed, built, shortened_
-
-    def _space(self, key: Any, shape: tuple[int, ...]) -> NDArray[Any]:
-        """Room that lasts for one evaluation."""
-        size = int(np.prod(shape))
-        room = self._room.get(key)
-        if room is None or room.size < size:
-            room = allocate((size + size // 8,), self.real, "what neighbours are read from")
-            self._room[key] = room
-        return room[:size].reshape(shape)
-
-    def _summed(
-        self, law: Law, what: str, target: str, sources: Iterable[str], time: float,
-        found: Lists, packed: Packed,
-    ) -> NDArray[Any]:  # fmt: skip
-        """Sums (numbers, n) over the neighbours of every particle of a target."""
-        n = found.arranged[target].order.size
-        out = self._space(("sums",), (law.sums(what), n))
-        out[:] = 0
-        own, other = law.fields[0], [name for name in law.fields[1] if name not in AXES]
-        mine = tuple(packed[target][name] for name in own)
-        limit = self.real(law.reach(time)) ** 2
-        kernel = law.sweep(what)
-        for source in sources:
-            numbers = law.numbers(time, self.real, (target, source))
-            records = packed[source][RECORDS]
-            theirs = tuple(packed[source][name] for name in other)
-            head = numbers, mine, records, theirs, limit, out
-            each(kernel, head, found.short[target, source])
-        return out
-
-    def _push(
-        self, law: Law, targets: Iterable[str], sources: Iterable[str], time: float,
-        found: Lists, packed: Packed,
-        pushes: dict[str, NDArray[Any]],
-    ) -> None:  # fmt: skip
-        numbers = law.numbers(time, self.real)
-        for target in targets:
-            sums = self._summed(law, law.summed, target, sources, time, found, packed)
-            mine = tuple(packed[target][name] for name in law.fields[0])
-            order, push = found.arranged[target].order, pushes[target]
-            each(law.finish, (numbers, mine, sums, order, push), blocks(order.size, ROWS))
+        found = memory.lists[k] = self._chosen(shared, found, places.packed, radius, rooms)
+        return found, self._sums.places(shared, found, bodies)
 
     # ------------------------------------------------------------------ measures
 
@@ -323,12 +251,13 @@ class Nearby:
                 continue
             part = Class(chosen)
             found = self.build(part, bodies)
-            packed, _, _ = self._packed(part, found, bodies)
-            found = self._chosen(part, found, packed, found.radius, {})
+            places = self._sums.places(part, found, bodies)
+            places()
+            found = self._chosen(part, found, places.packed, found.radius, {})
             time = next(iter(bodies.values())).time
             for law, targets, sources in chosen:
                 for target in targets:
-                    sums = self._summed(law, what, target, sources, time, found, packed)
+                    sums = self._sums.summed(law, what, target, sources, time, found, places.packed)
                     share_ = 0.5 if target in sources else 1.0
                     total += share_ * sums.sum(axis=1, dtype=np.float64)
         return total
@@ -338,6 +267,6 @@ def _kept(body: Body) -> tuple[int, int]:
     return body.alive, body.rows.deaths
 
 
-def _holds(found: Lists | None, systems: Iterable[str], bodies: dict[str, Body]) -> bool:
+def _holds(found: Lists | None, kept: Kept) -> bool:
     """Whether lists are of the particles that there are."""
-    return found is not None and all(found.kept[n] == _kept(bodies[n]) for n in systems)
+    return found is not None and found.kept.items() <= kept.items()

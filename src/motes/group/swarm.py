@@ -13,6 +13,7 @@ from motes.compile.gather import LANES, Gathering
 from motes.compile.pairs import Law
 from motes.interact.arrange import Box
 from motes.interact.cells import Cells, Grid, sort
+from motes.interact.counting_sort import Room, room_for
 from motes.interact.runs import inside, pick, rows_of_cells, rows_wanted
 from motes.jit import blocks, share
 
@@ -45,6 +46,7 @@ class _Sorted:
     grid: Grid
     cells: Cells
     body: Any
+    room: Room
     columns: dict[str, Array] = field(default_factory=dict)
 
     def column(self, key: str) -> Array:
@@ -54,7 +56,9 @@ class _Sorted:
             return axis
         if key not in self.columns:
             row = self.cells.row
-            out = self.columns[key] = np.zeros(row.size + LANES, self.cells.position.dtype)
+            real = self.cells.position.dtype
+            out = self.columns[key] = room_for(self.room, key, (row.size + LANES,), real)
+            out[row.size :] = 0
             values, parts = self.body.column(key), blocks(row.size, ROWS)
 
             def take(k: int) -> None:
@@ -80,6 +84,7 @@ class Swarm:
         self.systems = sorted({n for _, targets, sources in laws for n in (*targets, *sources)})
         self._slots: Array = np.empty(0, np.int32)
         self._room = ROOM
+        self._rooms: dict[str, Room] = {}
         self._alike: list[tuple[Gathering, str, tuple[str, ...]]] = []
         for target in self.systems:
             felt: dict[tuple[str, ...], list[Law]] = {}
@@ -116,7 +121,8 @@ class Swarm:
         reach = max(law.reach(time) for law in own or [law for law, _, _ in self.laws])
         low: Array = self.periodic.low.astype(real)
         size: Array = self.periodic.size.astype(real)
-        position: Array = np.empty((3, n), real)
+        room = self._rooms.setdefault(name, {})
+        position = room_for(room, "position", (3, n), real)
         parts = blocks(n, ROWS)
         found: Array = np.zeros((max(len(parts), 1), 2, 3), real)
 
@@ -129,11 +135,11 @@ class Swarm:
         bounds = np.where(size > 0, [np.zeros(3), self.periodic.size], ends).astype(float)
         box: Array = np.where(size > 0, size, np.inf).astype(real)
         cut = rows_of_cells(bounds, reach, 1, box, self.periodic.low)
-        cells = sort(position, cut, LANES)
+        cells = sort(position, cut, LANES, room)
         if (across := rows_wanted(cells.key)) > 1:
             cut = rows_of_cells(bounds, reach, across, box, self.periodic.low)
-            cells = sort(position, cut, LANES)
-        return _Sorted(cut, cells, body)
+            cells = sort(position, cut, LANES, room)
+        return _Sorted(cut, cells, body, room)
 
     def _gather(
         self, kernel: Gathering, target: _Sorted, sources: Sequence[_Sorted], time: float,
@@ -143,8 +149,9 @@ class Swarm:
         n, real = target.cells.row.size, self.real
         numbers = kernel.numbers(time, real)
         mine = tuple(target.column(key) for key in kernel.own)
-        if self._slots.size < n + LANES:
-            self._slots = np.arange(2 * n + LANES, dtype=np.int32)
+        most = max(n, *(source.cells.row.size for source in sources)) + LANES
+        if self._slots.size < most:
+            self._slots = np.arange(2 * most, dtype=np.int32)
         kept: Array = np.empty((kernel.sums, n + LANES if len(sources) > 1 else 0), real)
         nobody = np.full(n + LANES if any(s is not target for s in sources) else 0, -1, np.int32)
         parts = blocks(n, min(MOST, max(LEAST, -(-n // 8))))
@@ -159,11 +166,11 @@ class Swarm:
                 while begin < end:
                     run: Array = np.empty((room, 2), np.int64)
                     shift: Array = np.empty((room, 3), real)
-                    chosen: Array = np.empty(room, np.uint32)
+                    chosen: Array = np.empty(room + LANES, np.int32)
                     begin, needed = kernel(
                         numbers, mine, slot, target.cells.key, int(target.grid.shape[0]), theirs,
-                        source.grid, source.cells, begin, end, run, shift, chosen, hold,
-                        source is not sources[0], source is sources[-1], kept,
+                        source.grid, source.cells, begin, end, run, shift, self._slots, chosen,
+                        hold, source is not sources[0], source is sources[-1], kept,
                         target.cells.row, push,
                     )  # fmt: skip
                     room = self._room = max(room, 2 * needed)

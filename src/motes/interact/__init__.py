@@ -41,7 +41,7 @@ class _Near(_Common):
     """Systems whose particles are felt, also such as `systems` does not name; when none is named,
     those that take part feel each other."""
 
-    skin: Number = quantity(0.25, "", at_least=0, at_most=1, scope="scene")
+    skin: Number = quantity(0.4, "", at_least=0, at_most=1, scope="scene")
     """Margin of neighbour lists as a share of the reach: wider lists are longer and last longer."""
 
     rebuild: int = quantity(0, at_least=0, at_most=1_000_000)

@@ -24,7 +24,7 @@ pieces are enough."""
 CLUSTER = 8
 """Most particles of a cluster."""
 
-SMALLEST_PART = 1 << 11
+SMALLEST_PART = 1 << 9
 LARGEST_PART = 1 << 14
 """Particles of one task."""
 
@@ -75,7 +75,7 @@ class Arranged(NamedTuple):
 
 
 @jit(flags=STRICT)
-def _wrap(position: Any, low: Any, size: Any, begin: Any, end: Any) -> None:
+def wrap(position: Any, low: Any, size: Any, begin: Any, end: Any) -> None:
     """Take coordinates into [low, low + size), in place."""
     for axis in range(3):
         first, length = low[axis], size[axis]
@@ -97,7 +97,7 @@ def wrapped(position: NDArray[Any], periodic: Box, count: int | None = None) -> 
     if periodic.size.any():
         real = position.dtype.type
         head = position, periodic.low.astype(real), periodic.size.astype(real)
-        each(_wrap, head, blocks(position.shape[1] if count is None else count, ROWS))
+        each(wrap, head, blocks(position.shape[1] if count is None else count, ROWS))
 
 
 def common_grid(positions: list[NDArray[Any]], reach: float, periodic: Box) -> Grid:
@@ -150,10 +150,12 @@ def _ghosts(
     return place, of, image
 
 
+_AROUND = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(27, 3)
+
+
 def _boxes(periodic: Box) -> NDArray[np.float64]:
     """Ways (27, 3) from a particle to its images in the boxes around [m]; box 13 is its own."""
-    steps = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(27, 3)
-    found: NDArray[np.float64] = steps * periodic.size
+    found: NDArray[np.float64] = _AROUND * periodic.size
     return found
 
 
@@ -236,42 +238,12 @@ def _cut(
     counts[part] = number + 1
 
 
-class Packing(NamedTuple):
-    """What tells where the particles of one system have gone since they were arranged."""
-
-    arranged: Arranged
-    periodic: Box
-
-    def positions(
-        self, position: NDArray[Any], out: NDArray[Any], mark: NDArray[Any] | None = None
-    ) -> NDArray[np.float64]:
-        """Fill (slots + 1, 4) from positions (3, rows): images near where they were arranged.
-
-        Returns the squares of the longest ways that one has gone since it was arranged, and since
-        it was at its `mark` (n, 4) [m2]. The last slot is a place far from everything, to fill
-        lists up with.
-        """
-        arranged = self.arranged
-        n = arranged.order.size
-        size = self.periodic.size.astype(out.dtype)
-        parts, images = blocks(n, ROWS), blocks(arranged.ghost_of.size, ROWS)
-        moved = np.zeros((len(parts) + 1, 2))
-        if mark is None:
-            mark = np.empty((0, 4), out.dtype)
-        head = position, arranged.order, arranged.real.position, size, mark, out, moved
-        each(_pack, head, [(k, *part) for k, part in enumerate(parts)])
-        of, image = arranged.ghost_of, arranged.image
-        each(_pack_images, (out, of, image, arranged.shift, n), images)
-        out[-1] = FAR
-        farthest: NDArray[np.float64] = moved.max(axis=0)
-        return farthest
-
-    def values(self, values: NDArray[Any], out: NDArray[Any]) -> None:
-        """Fill (slots + 1,) from values (rows,)."""
-        parts = blocks(self.arranged.slots, ROWS)
-        order, ghost_of = self.arranged.order, self.arranged.ghost_of
-        share(lambda k: _take(values, order, ghost_of, out, *parts[k]), len(parts))
-        out[-1] = out[0]
+def packed_values(arranged: Arranged, values: NDArray[Any], out: NDArray[Any]) -> None:
+    """Fill (slots + 1,) from values (rows,)."""
+    parts = blocks(arranged.slots, ROWS)
+    order, ghost_of = arranged.order, arranged.ghost_of
+    share(lambda k: _take(values, order, ghost_of, out, *parts[k]), len(parts))
+    out[-1] = out[0]
 
 
 FAR = 1e15
@@ -279,10 +251,15 @@ FAR = 1e15
 
 
 @jit
-def _pack(
+def pack(
     position: Any, order: Any, then: Any, size: Any, mark: Any, out: Any, moved: Any, part: Any,
     begin: Any, end: Any,
 ) -> None:  # fmt: skip
+    """Fill places (slots + 1, 4) from positions (3, rows): images near where they were arranged.
+
+    Into `moved` go the squares of the longest ways that one has gone since it was arranged, and
+    since it was at its `mark` (n, 4).
+    """
     most = far = out.dtype.type(0)
     marked = mark.shape[0] > 0
     for i in range(np.uint64(begin), np.uint64(end)):
@@ -307,7 +284,8 @@ def _pack(
 
 
 @jit
-def _pack_images(out: Any, of: Any, image: Any, shift: Any, n: Any, begin: Any, end: Any) -> None:
+def pack_images(out: Any, of: Any, image: Any, shift: Any, n: Any, begin: Any, end: Any) -> None:
+    """Fill places of ghosts from those of whom they are images."""
     for g in range(np.uint64(begin), np.uint64(end)):
         i, k, to = np.uint64(of[g]), np.uint64(image[g]), np.uint64(n) + g
         for axis in range(3):

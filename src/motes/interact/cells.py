@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.interact.counting_sort import sorted_rows
+from motes.interact.counting_sort import Room, counted_rows, room_for, sorted_rows
 from motes.jit import STRICT, blocks, jit, share
 
 ROWS = 1 << 15
@@ -62,6 +62,18 @@ class Cells(NamedTuple):
     """Lower bits of a cell's number that the table leaves out."""
 
 
+def numbers(name: str, given: Any, real: Any = None) -> NDArray[Any]:
+    """An array of real numbers. Raises ValueError, with its name, for what is none."""
+    try:
+        array = np.asarray(given)
+        if array.dtype.kind in "biuf":
+            return array if real is None else array.astype(real)
+    except ValueError:  # Rows of different lengths.
+        pass
+    kind = type(given).__name__
+    raise ValueError(f"{name} must be an array of real numbers, all rows as long, not a {kind}")
+
+
 def period(box: Any, dimensions: int, real: type) -> NDArray[Any]:
     """The box's edges as three numbers, infinite along open axes.
 
@@ -70,9 +82,9 @@ def period(box: Any, dimensions: int, real: type) -> NDArray[Any]:
     """
     edges: NDArray[Any] = np.full(3, np.inf, real)
     if box is not None:
-        given: NDArray[Any] = np.asarray(box, real)
+        given = numbers("box", box, real)
         if given.ndim > 1 or given.size not in (1, dimensions):
-            raise ValueError(f"box must be one length or {dimensions}, not {box!r}")
+            raise ValueError(f"box must be one length or {dimensions}, not of shape {given.shape}")
         edges[:dimensions] = given
     if not np.all(edges > 0):
         raise ValueError(f"box = {box!r} must have edges above 0 (infinite along open axes)")
@@ -191,11 +203,14 @@ def _index(key: Any, begin: Any, shift: Any, last: Any, first: Any) -> None:
         first[entry:] = begin + key.size - skipped
 
 
-def sort(position: NDArray[Any], grid: Grid, spare: int = 0) -> Cells:
-    """The points (3, n) in the order of (cell, row), with room for some more behind them."""
+def sort(position: NDArray[Any], grid: Grid, spare: int = 0, room: Room | None = None) -> Cells:
+    """The points (3, n) in the order of (cell, row), with room for some more behind them.
+
+    What is returned is in `room`, if one is given, until it serves again.
+    """
     n = position.shape[1]
     parts = blocks(n, ROWS)
-    key = np.empty(n, np.uint64)
+    key = room_for(room, "key", (n,), np.uint64)
 
     def write(part: int) -> None:
         rows = slice(*parts[part])
@@ -204,15 +219,21 @@ def sort(position: NDArray[Any], grid: Grid, spare: int = 0) -> Cells:
     share(write, len(parts))
     total = int(np.prod(grid.shape, dtype=object))
     bits = (total - 1).bit_length()
-    key, row = sorted_rows(key, bits)
-    shift = max(0, bits - (_ENTRIES * max(n, 1)).bit_length())
-    first = np.zeros(((total - 1) >> shift) + 2, np.int32)
-    ordered = np.zeros((3, n + spare), position.dtype)
+    ordered = room_for(room, "ordered", (3, n + spare), position.dtype)
+    ordered[:, n:] = 0
+    if total <= _ENTRIES * n:
+        key, row, first = counted_rows(key, total, room)
+        shift = 0
+    else:
+        key, row = sorted_rows(key, bits)
+        shift = max(0, bits - (_ENTRIES * max(n, 1)).bit_length())
+        first = np.zeros(((total - 1) >> shift) + 2, np.int32)
 
     def index(part: int) -> None:
         begin, end = parts[part]
         _gather(position, row[begin:end], ordered[:, begin:end])
-        _index(key[max(begin - 1, 0) : end], begin, np.uint64(shift), end == n, first)
+        if total > _ENTRIES * n:
+            _index(key[max(begin - 1, 0) : end], begin, np.uint64(shift), end == n, first)
 
     share(index, len(parts))
     return Cells(ordered, row, key, first, np.uint64(shift))

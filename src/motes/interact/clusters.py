@@ -19,7 +19,7 @@ from motes.interact.arrange import CLUSTER, FAR, Arranged
 from motes.interact.cells import Grid
 from motes.jit import STRICT, each, jit
 from motes.machine.shuffles import LANES, near_slots, taken_apart
-from motes.memory import allocate
+from motes.memory import afford, allocate
 
 
 class Part(NamedTuple):
@@ -152,7 +152,8 @@ def _seek(
     position: Any, cells: Any, ghosts: Any, grid: Any, inner: Any, radius: Any, state: Any,
     part: Any, cluster: Any, room: Any, first: Any, entry: Any,
 ) -> None:  # fmt: skip
-    """Append lists of a part's clusters; `state` holds the first without, and what that needs."""
+    """Append lists of a part's clusters; `state` holds the first without, what that needs, and the
+    length of the longest list so far."""
     real = position.dtype.type
     wide = radius * (1 + 2.0**-18)
     limit, nought = real(wide) * real(wide), real(0)
@@ -165,7 +166,7 @@ def _seek(
     cell_key, cell_table, cell_shift = cells.key, cells.first, cells.shift
     ghost_key, ghost_table, ghost_shift = ghosts.key, ghosts.first, ghosts.shift
     rx, ry, rz = room.position[0], room.position[1], room.position[2]
-    slots = room.slot
+    slots, longest = room.slot, state[part, 2]
     for c in range(state[part, 0], cluster.size - 1):
         a, b = cluster[c], cluster[c + 1]
         x0 = x1 = xs[a]
@@ -192,7 +193,7 @@ def _seek(
         size = (points + LANES - 1) // LANES * LANES
         total = LANES * first[c]
         if size > slots.size or total + size + LANES > entry.size:
-            state[part, 0], state[part, 1] = c, size
+            state[part, 0], state[part, 1], state[part, 2] = c, size, longest
             return
         for q in range(points, size):
             rx[q], slots[q] = far, nobody
@@ -206,25 +207,25 @@ def _seek(
         for q in range(found, full):
             out[q] = nobody
         first[c + 1] = (total + full) // LANES
-    state[part, 0] = cluster.size - 1
+        longest = max(longest, full)
+    state[part, 0], state[part, 2] = cluster.size - 1, longest
 
 
 @jit(flags=STRICT)
 def _choose(
     own: Any, others: Any, limit: Any, itself: Any, state: Any, part: Any, cluster: Any,
-    near_first: Any, near: Any, room: Any, first: Any, entry: Any,
+    near_first: Any, near: Any, place: Any, first: Any, entry: Any,
 ) -> None:  # fmt: skip
     """Append lists of the particles of a part's clusters, of what is within a square of a distance;
     `state` as for `_seek`."""
-    nobody = np.int32(others.shape[0] - 1)
+    nobody, longest = np.int32(others.shape[0] - 1), state[part, 2]
     for c in range(state[part, 0], cluster.size - 1):
         a, b = cluster[c], cluster[c + 1]
         slot = near[LANES * near_first[c] : LANES * near_first[c + 1]]
         total = LANES * first[a - cluster[0]]
         if total + (b - a) * (slot.size + LANES) > entry.size:
-            state[part, 0], state[part, 1] = c, slot.size
+            state[part, 0], state[part, 1], state[part, 2] = c, slot.size, longest
             return
-        place = room.position
         xs, ys, zs = place[0][: slot.size], place[1][: slot.size], place[2][: slot.size]
         taken_apart(others, slot, xs, ys, zs)
         for i in range(a, b):
@@ -237,7 +238,8 @@ def _choose(
                 out[q] = nobody
             total += full
             first[i - cluster[0] + 1] = total // LANES
-    state[part, 0] = cluster.size - 1
+            longest = max(longest, full)
+    state[part, 0], state[part, 2] = cluster.size - 1, longest
 
 
 def cluster_lists(
@@ -255,8 +257,8 @@ def cluster_lists(
     for k, cluster in enumerate(targets.clusters):
         first, entry = np.zeros(cluster.size, np.int64), _again(room, k, 400 * cluster.size)
         work.append((k, cluster, _candidates(1024, real), first, entry))
-    done = _carried_out(_seek, head, work, room)
-    return [Clusters(one[1], one[3], one[4], _longest(one[3])) for one in done]
+    longest = _carried_out(_seek, head, work, room)
+    return [Clusters(one[1], one[3], one[4], longest[one[0]]) for one in work]
 
 
 def particle_lists(
@@ -272,10 +274,10 @@ def particle_lists(
     for k, (cluster, near_first, near, longest) in enumerate(lists):
         many = int(cluster[-1] - cluster[0])
         first, entry = np.zeros(many + 1, np.int64), _again(room, k, 96 * many)
-        places = _candidates(longest, real)
-        work.append((k, cluster, near_first, near, places, first, entry))
-    done = _carried_out(_choose, (own, others, real(radius) ** 2, itself), work, room)
-    return [Part(int(one[1][0]), one[5], one[6], _longest(one[5])) for one in done]
+        place = np.empty((3, longest), real)
+        work.append((k, cluster, near_first, near, place, first, entry))
+    most = _carried_out(_choose, (own, others, real(radius) ** 2, itself), work, room)
+    return [Part(int(one[1][0]), one[5], one[6], most[one[0]]) for one in work]
 
 
 def _again(room: Room, k: int, likely: int) -> NDArray[np.int32]:
@@ -283,29 +285,29 @@ def _again(room: Room, k: int, likely: int) -> NDArray[np.int32]:
     return room[k] if k < len(room) else np.empty(likely + 4096, np.int32)
 
 
-def _longest(first: NDArray[np.int64]) -> int:
-    return LANES * int(np.diff(first).max(initial=1))
+def _carried_out(kernel: Any, head: Any, work: list[Any], room: Room) -> list[int]:
+    """Let a kernel fill the lists of all parts, with more room for those that need it.
 
-
-def _carried_out(kernel: Any, head: Any, work: list[Any], room: Room) -> list[Any]:
-    """Let a kernel fill the lists of all parts, with more room for those that need it."""
-    state = np.zeros((len(work), 2), np.int64)
+    Returns the length of the longest list of every part, at least one vector.
+    """
+    state = np.zeros((len(work), 3), np.int64)
     waiting = work
     while waiting:
         each(kernel, (*head, state), waiting)
         waiting = [one for one in work if state[one[0], 0] < one[1].size - 1]
         for one in waiting:
-            work[one[0]] = _wider(one, *state[one[0]].tolist())
+            work[one[0]] = _wider(one, *state[one[0], :2].tolist())
+            afford(sum(part[-1].nbytes for part in work), "a list of neighbours")
         waiting = [work[one[0]] for one in waiting]
     room[:] = [one[-1] for one in work]
-    return work
+    return [max(LANES, longest) for longest in state[:, 2].tolist()]
 
 
 def _wider(one: Any, begin: int, points: int) -> Any:
     """A part's work with room to go on from a cluster that has so many candidates."""
     cluster = one[1]
     places, first, entry = one[-3:]
-    if points > places.slot.size:
+    if isinstance(places, _Candidates) and points > places.slot.size:
         places = _candidates(2 * points, places.position.dtype)
     held, most = LANES * int(first.max()), CLUSTER * (points + LANES)
     if held + most > entry.size:

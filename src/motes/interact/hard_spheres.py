@@ -39,7 +39,8 @@ class HardSpheres:
 
     def exchange(p: Any, movers: Sequence[Movers], when: Occasion) -> bool:
         """Let all that overlap collide; returns whether any were moved."""
-        from motes.interact.exchanges import collide
+        from motes.interact.collisions import Law, Spheres, collide, slabs
+        from motes.interact.counting_sort import sorted_rows
         from motes.interact.search import Who
         from motes.neighbours import _around
 
@@ -49,15 +50,19 @@ class HardSpheres:
         size = np.concatenate([one.size for one in movers]).astype(float)
         if m.size < 2 or not np.isfinite(x).all():
             return False
-        order = np.lexsort((np.concatenate([one.ids for one in movers]),))
+        low, box = when.periodic.low[:, None], when.periodic.size
+        inside = x - low
+        slab, many = slabs(inside, float(size.max()), box)
+        _, order = sorted_rows(np.concatenate([one.ids for one in movers]), 64)
+        _, by_slab = sorted_rows(slab[order].astype(np.uint64), many.bit_length())
+        order = order[by_slab]
         x, v, m, size = x[:, order], v[:, order], m[order], size[order]
-        low, box = when.periodic.low, when.periodic.size
-        period = np.where(box > 0, box, np.inf)
-        found = _around((x - low[:, None]).T, None, float(size.max()), period, Who.LATER)
-        far = np.where(box > 0, box, 1e300)
+        begins = np.searchsorted(slab[order], np.arange(many + 1))
+        period, far = np.where(box > 0, box, np.inf), np.where(box > 0, box, 1e300)
+        near = _around(inside[:, order].T, None, float(size.max()), period, Who.LATER)
         planes = when.planes(x, 0.5 * float(size.max()))
-        law = p.restitution, p.friction, p.rest_speed, p.rounds
-        if not collide(found.first, found.row, x, v, m, size, far, x.copy(), *planes, *law):
+        law = Law(float(p.restitution), float(p.friction), float(p.rest_speed), int(p.rounds))
+        if not collide(Spheres(x, v, m, size), near, begins, far, planes, law):
             return False
         back = np.empty_like(order)
         back[order] = np.arange(order.size)

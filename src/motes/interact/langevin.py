@@ -31,7 +31,7 @@ class Langevin:
 
     def exchange(p: Any, movers: Sequence[Movers], when: Occasion) -> bool:
         """Change the velocities of all particles."""
-        from motes.interact.exchanges import shaken
+        from motes.interact.kicks import shaken
         from motes.philox import channel
 
         keep = exp(-p.friction * when.length)

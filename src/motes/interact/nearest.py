@@ -165,7 +165,7 @@ def _first_radius(
     spread = np.diff(np.quantile(sample.astype(np.float64), (0.1, 0.9), axis=1), axis=0)[0] / 0.8
     edges = spread[spread > 0] if np.any(spread > 0) else np.array([1.0])
     part = (wanted + 3 * np.sqrt(wanted)) / n / _BALL[len(edges)]
-    radius = float((np.prod(edges) * part) ** (1 / len(edges)))
+    radius = float(np.exp(np.log(edges).mean()) * part ** (1 / len(edges)))
     for _ in range(HALVINGS):
         cut = grid(bounds, radius, box)
         cells = sort(position, cut)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from motes.interact.cells import Grid, first_from, grid
 from motes.jit import STRICT, jit
-from motes.machine.lanes import bits, lowest, take
+from motes.machine.lanes import put_some, take
 
 ALONG = 4
 """Cells along x for each reach."""
@@ -148,51 +148,37 @@ def runs_near(low: Any, high: Any, reach: Any, grid: Any, cells: Any, run: Any, 
     return number, points
 
 
-WORD = 64
-"""Points whose marks are the bits of one integer."""
-
-
 @cache
 def chooser(lanes: int) -> Any:
     """A kernel that chooses points, looking at a number of them at once.
 
-    `choose(places, low, high, limit, r, number, run, shift, pick)` writes into `pick` what is
+    `choose(places, low, high, limit, r, number, run, shift, ramp, pick)` writes into `pick` what is
     within reach of a box, `limit` its square, in run r and those after it that are shifted alike.
-    It returns the run after them, and how many points there are. To look at a word of bits before
-    any point is met leaves the loop over what was chosen without a branch.
+    It returns the run after them, and how many points there are. `ramp` is 0, 1, 2, ...
     """
 
     @jit(inline=True)
     def choose(
-        places: Any, low: Any, high: Any, limit: Any, r: Any, number: Any, run: Any,
-        shift: Any, pick: Any,
+        places: Any, low: Any, high: Any, limit: Any, r: Any, number: Any, run: Any, shift: Any,
+        ramp: Any, pick: Any,
     ) -> Any:  # fmt: skip
-        x, y, z = places
-        zero, dx, dy, dz = limit - limit, shift[r, 0], shift[r, 1], shift[r, 2]
+        dx, dy, dz = shift[r, 0], shift[r, 1], shift[r, 2]
         west, south, floor = low[0] - dx, low[1] - dy, low[2] - dz
         east, north, roof = high[0] - dx, high[1] - dy, high[2] - dz
-        held = np.uint64(0)
+        held = 0
         while r < number and shift[r, 0] == dx and shift[r, 1] == dy and shift[r, 2] == dz:
             at, last = run[r, 0], run[r, 1]
             while at < last:
-                some, marks = min(last - at, WORD), np.uint64(0)
-                for c in range(0, some, lanes):
-                    px, py, pz = (
-                        take(x, at + c, lanes),
-                        take(y, at + c, lanes),
-                        take(z, at + c, lanes),
-                    )
-                    gx = max(max(px - east, west - px), zero)
-                    gy = max(max(py - north, south - py), zero)
-                    gz = max(max(pz - roof, floor - pz), zero)
-                    near = gx * gx + gy * gy + gz * gz <= limit
-                    marks |= bits(near) << np.uint64(c)
-                marks &= np.uint64(0xFFFFFFFFFFFFFFFF) >> np.uint64(WORD - some)
-                while marks != np.uint64(0):
-                    pick[held] = np.uint32(np.uint64(at) + lowest(marks))
-                    marks &= marks - np.uint64(1)
-                    held += np.uint64(1)
-                at += WORD
+                x = take(places[0], at, lanes)
+                y = take(places[1], at, lanes)
+                z = take(places[2], at, lanes)
+                gx = x - max(min(x, east), west)
+                gy = y - max(min(y, north), south)
+                gz = z - max(min(z, roof), floor)
+                who = take(ramp, at, lanes)
+                near = (gx * gx + gy * gy + gz * gz <= limit) & (who < np.int32(last))
+                held += put_some(pick, held, who, near)
+                at += lanes
             r += 1
         return r, held
 

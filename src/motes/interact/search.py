@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from motes.interact.cells import MOST_RUNS, Cells, Grid, apart, runs_around
 from motes.jit import STRICT, blocks, jit, share
-from motes.memory import allocate
+from motes.memory import afford, allocate
 
 TARGETS = 1 << 12
 """Targets of one task."""
@@ -20,6 +20,9 @@ _FEW = 512
 """Neighbours up to which sorting in quadratic time, but by SIMD, is fastest."""
 
 _GAPS = (701, 301, 132, 57, 23, 10, 4, 1)
+
+
+LIST = "a list of neighbours"
 
 
 class Who(IntEnum):
@@ -205,6 +208,7 @@ def search(
     parts = blocks(targets.row.size, TARGETS)
     count = np.zeros(targets.row.size, np.int32)
     parcels: list[NDArray[np.int32]] = [np.empty(0, np.int32)] * len(parts)
+    held = [0] * len(parts)
 
     def seek(part: int) -> None:
         begin, end = parts[part]
@@ -216,8 +220,10 @@ def search(
             if points > room.row.size:
                 room = candidates(2 * points, real)
             if total + points > found.size:
-                old = found
-                found = allocate((2 * (total + points),), np.int32, "a list of neighbours")
+                old, size = found, 2 * (total + points)
+                held[part] = size
+                afford(2 * found.itemsize * sum(held), LIST)  # What all find is copied once.
+                found = allocate((size,), np.int32, LIST)
                 found[:total] = old[:total]
         parcels[part] = found[:total]
 
@@ -227,7 +233,7 @@ def search(
     first = np.zeros(len(count) + 1, np.int64)
     np.cumsum(lengths, dtype=np.int64, out=first[1:])
     if into is None or into.size < first[-1]:
-        into = allocate((int(spare * first[-1]),), np.int32, "a list of neighbours")
+        into = allocate((int(spare * first[-1]),), np.int32, LIST)
     row = into
 
     def arrange(part: int) -> None:

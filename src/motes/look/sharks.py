@@ -38,10 +38,10 @@ class Sharks:
             high = p.depth * 1.72 * (u + 0.004) ** 0.5 * (1.02 - u) ** 0.85
             parts.append((place, bent(place), 0.2 * high, 0.95 * high, 0.55))
             parts.append((place, bent(place), -0.24 * high, 0.8 * high, 1.9))
-        for t in np.linspace(0, 1, 12):
+        for t in np.linspace(0, 1, 20):
             for upper, long, high in ((1, 0.11, 0.2), (-1, 0.06, 0.11)):  # The tail's lobes.
                 place = -0.36 - long * t
-                dot = 0.034 * (1.15 - 0.8 * t)
+                dot = 0.04 * (1.15 - 0.6 * t)
                 parts.append((place, bent(place), upper * high * t, dot, 0.6))
             for s in np.linspace(0, 1, 4):  # The back's fin, swept to behind.
                 place = 0.09 - 0.1 * t - (0.11 - 0.08 * t) * s
@@ -49,6 +49,6 @@ class Sharks:
             for side in (-1, 1):  # The breast's fins.
                 place = 0.2 - 0.13 * t
                 left = bent(place) + side * (0.04 + 0.19 * t)
-                dot = 0.06 * (1.1 - 0.75 * t)
+                dot = 0.06 * (1.1 - 0.6 * t)
                 parts.append((place, left, -0.3 * p.depth - 0.05 * t, dot, 0.7))
         return parts

@@ -21,6 +21,7 @@ from motes.machine.kinds import (
     Unsupported,
     of_dtype,
 )
+from motes.pool import share_out
 
 _PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_char_p, ctypes.c_void_p)
 """Calls through it release the interpreter's lock."""
@@ -176,3 +177,28 @@ class Door:
         packs = [first + pack(*tail) for tail in tails]
         run, whole, count, stride = self._each, b"".join(packs), len(packs), len(packs[0])
         return lambda counter, most: run(whole, stride, counter, count, most)
+
+    def again(
+        self, head: Sequence[Any], middle: int, tails: Sequence[Sequence[Any]]
+    ) -> Callable[..., None] | None:
+        """Calls with the same first and last numbers, as one function of those in the middle.
+
+        None where calls give results.
+        """
+        run = self._each
+        if self._size or run is None:
+            return None
+        begin, end = len(head), len(head) + middle
+        first = struct.pack("=" + self._letters[:begin], *head)
+        pack = struct.Struct("=" + self._letters[begin:end]).pack
+        lasts = [struct.pack("=" + self._letters[end:], *tail) for tail in tails]
+        if len(tails) == 1:
+            function, last = self._function, lasts[0]
+            return lambda *numbers: function(first + pack(*numbers) + last, None)
+        count, stride = len(tails), 8 * len(self._letters)
+
+        def calls(*numbers: float) -> None:
+            whole = b"".join([first + pack(*numbers) + last for last in lasts])
+            share_out(lambda counter, most: run(whole, stride, counter, count, most), count)
+
+        return calls

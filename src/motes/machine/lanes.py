@@ -68,10 +68,10 @@ def rough_inverse_root(value: Any) -> Any:
 
 
 def put_some(array: Any, place: Any, value: Any, condition: Any) -> int:
-    """Write the lanes where a condition holds to an array of numbers of 32 bits, one after another.
+    """Write the lanes where a condition holds to an array, one after another.
 
     Returns how many there are; as many numbers as there are lanes may change, from `place` on.
     """
-    some = value[condition]
+    some = np.atleast_1d(value)[np.atleast_1d(condition)]
     array[place : place + len(some)] = some
     return len(some)

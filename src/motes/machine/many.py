@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from motes.machine.kinds import INT, SINGLE, Unsupported
+from motes.machine.kinds import INT, SINGLE, Number, Unsupported
 from motes.machine.memory import Memory
 from motes.machine.shuffles import LANES, order_table
 from motes.machine.values import Scalar, Value, View
@@ -84,31 +84,41 @@ class Many(Memory):
         return Scalar(kind, self.do(f"call {kind.llvm} {name}({kind.llvm} {value.text}{more})"))
 
     def put_some(self, array: Value, place: Value, value: Value, condition: Value) -> Value:
-        """`lanes.put_some`: by a table of orders for eight lanes, else by LLVM's own means."""
+        """`lanes.put_some`: by a table of orders for eight lanes of 32 bits, else one by one."""
         from motes.machine.target import moves_lanes
 
         truth = self.truth(condition)
         if not isinstance(array, View) or not isinstance(value, Scalar):
             raise Unsupported("lanes are written to an array")
         assert isinstance(place, Scalar)
-        kind = array.type.item.over(truth.type.lanes)
-        if kind.over(1).llvm != "i32":
-            raise Unsupported("some lanes are written as integers of 32 bits")
-        at, text, lanes = self._start(array, place), self.cast(value, kind).text, kind.lanes
+        one, lanes = array.type.item, truth.type.lanes
+        at, memory = self._start(array, place), self.kind_of_memory(one)
+        text = self.cast(value, one.over(lanes)).text
         marks = self.do(f"bitcast {truth.type.llvm} {truth.text} to i{lanes}")
-        memory = self.kind_of_memory(array.type.item)
-        if lanes == LANES and moves_lanes():
+        if lanes == LANES and one.bytes == 4 and moves_lanes():
             wide = self.do(f"zext i8 {marks} to i64")
             row = self.do(f"getelementptr inbounds <8 x i32>, ptr {order_table(self)}, i64 {wide}")
             order = self.do(f"load <8 x i32>, ptr {row}, align 32")
+            whole = self.do(f"bitcast <8 x {one.llvm}> {text} to <8 x i32>")
             self.declare("declare <8 x i32> @llvm.x86.avx2.permd(<8 x i32>, <8 x i32>)")
-            call = f"call <8 x i32> @llvm.x86.avx2.permd(<8 x i32> {text}, <8 x i32> {order})"
+            call = f"call <8 x i32> @llvm.x86.avx2.permd(<8 x i32> {whole}, <8 x i32> {order})"
             self.line(f"store <8 x i32> {self.do(call)}, ptr {at}, align 4{memory}")
         else:
-            name = f"@llvm.masked.compressstore.v{lanes}i32"
-            self.declare(f"declare void {name}({kind.llvm}, ptr, {truth.type.llvm})")
-            given = f"{kind.llvm} {text}, ptr {at}, {truth.type.llvm} {truth.text}"
-            self.line(f"call void {name}({given})")
+            self._put_one_by_one(one, at, text, truth)
+        if lanes == 1:
+            return Scalar(INT, self.do(f"zext i1 {marks} to i64"))
         self.declare(f"declare i{lanes} @llvm.ctpop.i{lanes}(i{lanes})")
         count = self.do(f"call i{lanes} @llvm.ctpop.i{lanes}(i{lanes} {marks})")
         return Scalar(INT, self.do(f"zext i{lanes} {count} to i64"))
+
+    def _put_one_by_one(self, one: Number, at: str, text: str, truth: Scalar) -> None:
+        """Write every lane, and move on where it counts: no branch, and the next one covers it."""
+        lanes, memory = truth.type.lanes, self.kind_of_memory(one)
+        for k in range(lanes):
+            item, mark = text, truth.text
+            if lanes > 1:
+                item = self.do(f"extractelement {one.over(lanes).llvm} {text}, i64 {k}")
+                mark = self.do(f"extractelement {truth.type.llvm} {truth.text}, i64 {k}")
+            self.line(f"store {one.llvm} {item}, ptr {at}{memory}")
+            step = self.do(f"zext i1 {mark} to i64")
+            at = self.do(f"getelementptr inbounds {one.llvm}, ptr {at}, i64 {step}")

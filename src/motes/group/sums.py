@@ -1,0 +1,203 @@
+"""Sums over lists of neighbours: what the laws of a group read, in the order of slots, and calls.
+
+An evaluation is first a list of calls, and then carried out: as long as its arrays are the same it
+can be carried out again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.compile.pairs import Law
+from motes.compile.text import AXES
+from motes.group.lasting import Body, Class, Lists
+from motes.interact.arrange import FAR, Arranged, Box, pack, pack_images, packed_values
+from motes.jit import even_blocks
+from motes.memory import allocate
+from motes.repeat import Repeats
+
+RECORDS = "records"
+"""Name of the places of all slots, x, y, z and a fourth number that nobody reads."""
+
+NO_MARKS: dict[type, Array] = {real: np.empty((0, 4), real) for real in (np.float32, np.float64)}
+"""Marks of nobody, by type of numbers."""
+
+Array = NDArray[Any]
+Call = Callable[[], None]
+Packed = dict[str, dict[str, Array]]
+"""Columns by system and name, in the order of slots."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Calls that write where everybody is."""
+
+    packed: Packed
+    calls: Sequence[Call]
+    ways: Sequence[Array]
+    """For every system, squares of the longest ways (k, 2) since lists were built and shortened."""
+    lasting: bool
+    """Whether all that is read, besides where they are, is the same as long as the lists hold."""
+
+    def __call__(self) -> tuple[float, float]:
+        """Write; returns how far one has moved since the lists were built, and shortened [m]."""
+        for call in self.calls:
+            call()
+        ways = self.ways[0] if len(self.ways) == 1 else np.concatenate(self.ways)
+        moved, since = ways.max(axis=0).tolist()
+        return math.sqrt(moved), math.sqrt(since)
+
+
+class Plan:
+    """An evaluation that can be carried out again while lists and arrays are the same."""
+
+    def __init__(
+        self, lists: Lists, places: Places, sums: Sequence[Call], time: float,
+        bodies: dict[str, Body], pushes: dict[str, Array],
+    ) -> None:  # fmt: skip
+        self.lists, self.places, self._sums, self.time = lists, places, sums, time
+        self._arrays = [
+            (name, bodies[name].motion, pushes[name], kept) for name, kept in lists.kept.items()
+        ]
+
+    def fits(self, lists: Lists, bodies: dict[str, Body], pushes: dict[str, Array]) -> bool:
+        """Whether lists, particles and arrays are those that it is for."""
+        if lists is not self.lists:
+            return False
+        for name, motion, push, kept in self._arrays:
+            body = bodies[name]
+            same = body.motion is motion and pushes[name] is push
+            if not same or (body.alive, body.rows.deaths) != kept:
+                return False
+        return True
+
+    def sums(self) -> None:
+        """Add the accelerations."""
+        for call in self._sums:
+            call()
+
+
+class Sums:
+    """Makes the calls of evaluations."""
+
+    def __init__(self, real: type, periodic: Box) -> None:
+        self.real = real
+        self._period: Array = periodic.size.astype(real)
+        self._rooms: dict[Any, tuple[Array, Array]] = {}
+        self._columns: dict[str, tuple[Array, dict[str, Array]]] = {}
+        self._calls = Repeats()
+
+    def places(self, shared: Class, found: Lists, bodies: dict[str, Body]) -> Places:
+        """What writes what the laws of a class read of every system in the order of slots.
+
+        Places come as records (slots + 1, 4), and, as the columns of these, one by one.
+        """
+        packed: Packed = {}
+        calls: list[Call] = []
+        ways: list[Array] = []
+        lasting = True
+        for name, fields in shared.fields.items():
+            body, arranged = bodies[name], found.arranged[name]
+            records = self._space((name, "x"), (arranged.slots + 1, 4))
+            calls += self._packing(body, arranged, records, found.marks.get(name), ways)
+            columns = packed[name] = self._views(name, records)
+            for field in fields:
+                kept, size = found.columns.get((name, field)), arranged.slots + 1
+                if kept is None and body.lasts(field):
+                    kept = found.columns[name, field] = np.empty(size, self.real)
+                    packed_values(arranged, body.column(field), kept)
+                elif kept is None:
+                    kept, lasting = self._space((name, field), (size,)), False
+                    calls.append(partial(packed_values, arranged, body.column(field), kept))
+                columns[field] = kept
+        return Places(packed, calls, ways, lasting)
+
+    def _packing(
+        self, body: Body, arranged: Arranged, records: Array, mark: Array | None, ways: list[Array]
+    ) -> list[Call]:
+        """Calls that write a system's places into records, and the longest ways."""
+        n, images = arranged.order.size, arranged.ghost_of.size
+        parts = [(k, *part) for k, part in enumerate(even_blocks(n))]
+        moved = self._space((body.name, "moved"), (max(len(parts), 1), 2), np.float64)
+        moved.fill(0)
+        ways.append(moved)
+        if mark is None:
+            mark = NO_MARKS[self.real]
+        place = arranged.order, arranged.real.position, self._period, mark, records, moved
+        image = records, arranged.ghost_of, arranged.image, arranged.shift, n
+        return [
+            self._calls((body.name, "x"), pack, (body.motion, *place), parts),
+            self._calls((body.name, "images"), pack_images, image, even_blocks(images)),
+            partial(records[-1].fill, FAR),
+        ]
+
+    def _views(self, name: str, records: Array) -> dict[str, Array]:
+        """A system's records, and their columns one by one; the same ones for the same records."""
+        known = self._columns.get(name)
+        if known is None or known[0] is not records:
+            columns = {RECORDS: records, **dict(zip(AXES, records.T, strict=False))}
+            known = self._columns[name] = records, columns
+        return dict(known[1])
+
+    def _space(self, key: Any, shape: tuple[int, ...], real: Any = None) -> Array:
+        """Room that lasts for one evaluation; the same array as before if it has the same shape."""
+        room, view = self._rooms.get(key, (None, None))
+        if view is None or view.shape != shape:
+            size = math.prod(shape)
+            if room is None or room.size < size:
+                room = allocate((size + size // 8,), real or self.real, "room for neighbours")
+            view = room[:size].reshape(shape)
+            self._rooms[key] = room, view
+        return view
+
+    def summed(
+        self, law: Law, what: str, target: str, sources: Iterable[str], time: float, found: Lists,
+        packed: Packed,
+    ) -> Array:  # fmt: skip
+        """Sums (numbers, n) over the neighbours of every particle of a target."""
+        out, calls = self._summing(law, what, target, sources, time, found, packed)
+        for call in calls:
+            call()
+        return out
+
+    def _summing(
+        self, law: Law, what: str, target: str, sources: Iterable[str], time: float, found: Lists,
+        packed: Packed,
+    ) -> tuple[Array, list[Call]]:  # fmt: skip
+        width, n = law.sums(what), found.arranged[target].order.size
+        out = self._space(("sums", width, target), (width, n))
+        own, other = law.fields[0], [name for name in law.fields[1] if name not in AXES]
+        mine = tuple(packed[target][name] for name in own)
+        limit = self.real(law.reach(time)) ** 2
+        kernel = law.sweep(what)
+        calls: list[Call] = []
+        for source in sources:
+            numbers = law.numbers(time, self.real, (target, source))
+            records = packed[source][RECORDS]
+            theirs = tuple(packed[source][name] for name in other)
+            head = numbers, mine, records, theirs, limit, not calls, out
+            name = law.address, what, target, source
+            calls.append(self._calls(name, kernel, head, found.short[target, source]))
+        return out, calls
+
+    def pushing(
+        self, law: Law, targets: Iterable[str], sources: Iterable[str], time: float, found: Lists,
+        packed: Packed, pushes: dict[str, Array],
+    ) -> list[Call]:  # fmt: skip
+        """Calls that add a law's accelerations (3, n) to pushes."""
+        numbers, done = law.numbers(time, self.real), []
+        for target in targets:
+            sums, calls = self._summing(law, law.summed, target, sources, time, found, packed)
+            mine = tuple(packed[target][name] for name in law.fields[0])
+            order, push = found.arranged[target].order, pushes[target]
+            head, parts = (numbers, mine, sums, order, push), even_blocks(order.size)
+            done += calls
+            done.append(self._calls((law.address, target), law.finish, head, parts))
+        return done

@@ -1,0 +1,120 @@
+"""Laws of spheres that collide: whoever works on them, and in whichever order."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import motes
+from motes.interact import collisions
+from motes.interact.collisions import slabs
+
+
+def heap(count: int, seed: int = 5) -> tuple[np.ndarray, np.ndarray]:
+    """Places and velocities of grains, 0.1 m wide, that lie loosely and overlap a little."""
+    rng = np.random.default_rng(seed)
+    edge = round(count ** (1 / 3))
+    lattice = np.stack(np.meshgrid(*[np.arange(edge)] * 3), -1).reshape(-1, 3)
+    return lattice * 0.099 + rng.normal(size=lattice.shape) * 0.004, rng.normal(size=lattice.shape)
+
+
+def grains(x: np.ndarray, v: np.ndarray, periodic: bool = False) -> motes.Simulation:
+    """A simulation of such grains, on a floor or in a box that repeats."""
+    size = 0.099 * np.ceil(np.ptp(x, axis=0) / 0.099)
+    scene = motes.Scene(
+        systems=[motes.System("grains", size=0.1)],
+        interact=[motes.interact.HardSpheres(restitution=0.5, friction=0.3)],
+        force=[] if periodic else [motes.force.Gravity()],
+        solid=[] if periodic else [motes.solid.Plane(position=(0, 0, float(x[:, 2].min()) - 0.01))],
+        periodic=motes.Periodic(size=tuple(size)) if periodic else motes.Periodic(),
+        step=0.004, integrator="semi_implicit_euler", precision="double",
+    )  # fmt: skip
+    sim = motes.Simulation(scene)
+    sim.place("grains", x, v)
+    return sim
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_grains_depend_neither_on_threads_nor_on_how_tasks_are_shared(
+    monkeypatch: pytest.MonkeyPatch, periodic: bool
+) -> None:
+    """Slabs of one colour share no sphere: all orders of them give the same bits."""
+    x, v = heap(1_500)
+    digests = set()
+    before = motes.threads()
+    try:
+        for threads, alone in ((1, 10**9), (1, 0), (2, 0), (3, 0)):
+            motes.threads(threads)
+            monkeypatch.setattr(collisions, "ALONE", alone)
+            sim = grains(x, v, periodic)
+            sim.run(steps=6)
+            digests.add(sim.digest())
+    finally:
+        motes.threads(before)
+    assert len(digests) == 1
+    assert np.abs(sim["grains"].velocity - v).max() > 0.5
+
+
+@pytest.mark.parametrize(
+    "box", [np.zeros(3), np.array([19.0, 0.0, 0.0]), np.array([2.0, 7.3, 0.0])]
+)
+def test_nobody_is_near_two_slabs_that_are_not_neighbours(box: np.ndarray) -> None:
+    """All within a reach of a sphere are in its slab or in one of two others, and of a ring of
+    slabs there is an even number."""
+    rng = np.random.default_rng(1)
+    span = np.where(box > 0, box, [6.0, 11.0, 3.0])
+    x, reach = rng.random((5_000, 3)) * span, 0.1
+    slab, many = slabs(np.ascontiguousarray(x.T), reach, box)
+    assert many > 8
+    assert set(slab) == set(range(many))
+    i, j = motes.neighbours.within(x, reach, box=np.where(box > 0, box, np.inf))
+    for here in range(many):
+        others = set(slab[j[slab[i] == here]])
+        ring = {(here + k) % many if box.any() else here + k for k in (-1, 0, 1)}
+        assert others <= ring
+    met = np.unique(np.stack([i, slab[j]], axis=1), axis=0)
+    beside = met[met[:, 1] != slab[met[:, 0]]]
+    assert np.unique(beside[:, 0], return_counts=True)[1].max() == 1
+    assert not box.any() or many % 2 == 0
+
+
+def test_order_of_rows_changes_nothing_of_grains() -> None:
+    """Collisions are in the order of places and ids: with rows moved, the same to the last bit."""
+    x, v = heap(700)
+    ends = []
+    for moved in (False, True):
+        sim = grains(x, v)
+        if moved:
+            rows = sim._state.systems["grains"]
+            rows.reorder(np.random.default_rng(2).permutation(rows.count).astype(np.int32))
+        sim.run(steps=5)
+        view = sim["grains"]
+        ends.append(np.hstack([view.position, view.velocity])[np.argsort(view.id)])
+    np.testing.assert_array_equal(ends[0], ends[1])
+
+
+def test_a_collision_of_unequal_spheres_is_that_of_the_textbook() -> None:
+    """Oblique, with friction: v' = v + J/m with J along the line of centres and against sliding.
+
+    J_n = (1 + e) u_n / (1/m1 + 1/m2), J_t = min(mu J_n, u_t / (1/m1 + 1/m2)), with u the approach.
+    """
+    e, mu, heavy = 0.5, 0.2, 3.0
+    scene = motes.Scene(
+        systems=[motes.System("a", size=1.0), motes.System("b", size=1.0, mass=heavy)],
+        interact=[motes.interact.HardSpheres(restitution=e, friction=mu, rounds=1)],
+        step=1e-3, integrator="semi_implicit_euler", precision="double",
+    )  # fmt: skip
+    sim = motes.Simulation(scene)
+    u, w = np.array([1.0, 0.4, 0.0]), np.array([-0.5, 0.0, 0.3])
+    sim.place("a", [[-0.4999, 0, 0]], u)
+    sim.place("b", [[0.4999, 0, 0]], w)
+    sim.run(steps=1)
+    share = 1 / (1 + 1 / heavy)
+    normal = (1 + e) * 1.5 * share
+    slide = (u - w) * [0, 1, 1]
+    speed = np.linalg.norm(slide)
+    impulse = np.array([-normal, 0, 0]) - min(mu * normal, speed * share) * slide / speed
+    # The line of centres turns by 1e-3 of the slide within the step.
+    assert sim["a"].velocity[0] == pytest.approx(u + impulse, abs=2e-3)
+    total = sim["a"].velocity[0] + heavy * sim["b"].velocity[0]
+    assert total == pytest.approx(u + heavy * w, abs=1e-14)
