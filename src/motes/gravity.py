@@ -190,7 +190,8 @@ def crossover(tolerance: float, dtype: np.dtype[Any]) -> float:
     1e-3, 1e-5, 1e-8.
     """
     digits = max(-math.log10(tolerance), 2.0)
-    return (10_000.0 if dtype == np.float32 else 4_500.0) * 1.42 ** (digits - 3.0)
+    base: float = 10_000.0 if dtype == np.float32 else 4_500.0
+    return base * math.pow(1.42, digits - 3.0)
 
 
 def _points(values: ArrayLike, name: str) -> NDArray[Any]:
