@@ -203,7 +203,7 @@ def test_a_component_of_a_notebook_cell_joins_the_catalog() -> None:
     linecache.cache[name] = (len(CELL), None, CELL.splitlines(True), name)
     scope: dict[str, Any] = {"__name__": "__main__"}
     exec(compile(CELL, name, "exec"), scope)
-    assert scope["Cell"].help() == {"push": "Its strength."}
+    assert scope["Cell"].help()["push"] == "Its strength."
     assert "push" in scope["Cell"].source()
     emitter = find("emit", "point")(burst=[{"count": 1}])
     system = motes.System("a", emit=[emitter], force=[scope["Cell"](push=2.0)])
