@@ -37,10 +37,10 @@ SINGLE_FROM = 4e-6
 LEAVES = 16
 """Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
-LEAVES_OF_A_CLASS = 6
+LEAVES_OF_A_CLASS = 8
 """Target leaves out of each further class, which has twice as many as the one before."""
 
-SAFETY = 0.85
+SAFETY = 0.72
 """Part of the tolerance that the error on the sample may use."""
 
 GROWTH = 3.0
@@ -184,7 +184,7 @@ class Problem:
                 exact = self._at(sample, strict)
             part = self._error(sample, self._at(sample, limits), exact) / (SAFETY * tolerance)
             if part <= 1.0:
-                if kept is not None or part > 0.75:
+                if kept is not None or part > 0.7:
                     return limits
                 kept = limits
             elif kept is not None:
