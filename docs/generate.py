@@ -24,7 +24,7 @@ import click
 from motes.catalog import KINDS, catalog, kinds
 from motes.cli import COMMANDS, group
 from motes.describe import DOCUMENT, Entry, Field, describe_kind
-from motes.integrate import scene_methods
+from motes.integrate import methods
 from motes.scene import gallery_text
 from motes.scene.gallery import gallery
 
@@ -128,7 +128,7 @@ def _methods() -> Iterator[str]:
             "yes" if method.symplectic else "",
             _inline(texts[name]),
         )
-        for name, method in scene_methods().items()
+        for name, method in methods().items()
     )
     yield _table(("Method", "Order", "Stages", "Symplectic", "When, and where it is from"), rows)
 
@@ -215,7 +215,7 @@ def _overview() -> str:
     """All components by kind, each with a link to its page."""
     rows = []
     for kind in (*KINDS, "integrate"):
-        names = scene_methods() if kind == "integrate" else catalog(kind)
+        names = methods() if kind == "integrate" else catalog(kind)
         link = f"[{_title(kind)}](docs/reference/{kind}.md)"
         rows.append((link, ", ".join(f"`{name}`" for name in names)))
     return _table(("Kind", "Components"), rows)

@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 from motes import ode
-from motes.integrate import scene_methods, table
+from motes.integrate import method
 from motes.ode.stability import error_constant
 
 PAGE = Path(__file__).with_suffix(".md")
@@ -29,7 +29,7 @@ def number(value: float) -> str:
 
 def facts_of(m: ode.MethodFacts) -> str:
     """What a method's table says about it, in sentences."""
-    found = table(m.name)
+    found = method(m.name)
     stages = f"{m.stages} stage{'s' if m.stages > 1 else ''}"
     parts = [f"Order {m.order}, {stages}"]
     if not math.isnan(constant := error_constant(found)):
@@ -46,8 +46,7 @@ def facts_of(m: ode.MethodFacts) -> str:
         "any oscillation" if math.isinf(m.imaginary)
         else f"oscillations to h w = {m.imaginary:.3g}" if m.imaginary else "no oscillation"
     )  # fmt: skip
-    where = "In scenes and `motes.ode`." if m.name in scene_methods() else "In `motes.ode`."
-    return f"{', '.join(parts)}. Stable for {' and '.join(limits)}. {where}"
+    return f"{', '.join(parts)}. Stable for {' and '.join(limits)}."
 
 
 def page() -> str:
@@ -66,7 +65,7 @@ def page() -> str:
         kind = "implicit" if m.implicit else "explicit"
         kind += ", symplectic" if m.symplectic else ""
         low = "–" if m.embedded is None else str(m.embedded)
-        constant = number(error_constant(table(m.name)))
+        constant = number(error_constant(method(m.name)))
         lines.append(
             f"| [{m.name}](#{m.name}) | {m.order} | {m.stages} | {kind} | {low} | "
             f"{number(m.real)} | {number(m.imaginary)} | {constant} |"

@@ -7,10 +7,10 @@ import inspect
 from dataclasses import dataclass
 from typing import Any
 
+from motes import integrate
 from motes.catalog import KINDS, Component, catalog, find, kinds
 from motes.catalog.parameter import Parameter
 from motes.errors import SceneError, likely
-from motes.integrate import method, scene_methods
 
 DOCUMENT = "document"
 """Kind of the tables that a scene itself has."""
@@ -81,7 +81,7 @@ def describe_kind(kind: str) -> Group:
     if kind == DOCUMENT:
         text, names = "The tables of a scene.", list(TABLES)
     elif kind == "integrate":
-        text, names = _text(importlib.import_module("motes.integrate")), list(scene_methods())
+        text, names = _text(importlib.import_module("motes.integrate")), list(integrate.names())
     else:
         _known(kind)
         text, names = _text(importlib.import_module(f"motes.{kind}")), list(catalog(kind))
@@ -98,7 +98,7 @@ def describe_entry(kind: str, name: str) -> Entry:
     if kind == DOCUMENT:
         return _table(name)
     if kind == "integrate":
-        method(name)
+        integrate.method(name)
         text = _text(importlib.import_module(f"motes.integrate.{name}"))
         return Entry(kind, name, _summary(text), text, (), f'integrator = "{name}"')
     _known(kind)

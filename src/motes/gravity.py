@@ -33,6 +33,9 @@ SOFTENINGS = ("spline", "plummer")
 TIGHTEST = {"single": 1e-6, "double": 1e-10}
 """Smallest tolerance by the precision of the positions."""
 
+FARTHEST = 1e150
+"""Edge of the largest cube around positions, whose square is still a number."""
+
 
 def acceleration(
     x: ArrayLike,
@@ -132,6 +135,8 @@ class _Problem:
         self.apart = targets is not None
 
         self.low, size = _cube(position, points)
+        if not size < FARTHEST:
+            raise ValueError(f"x spans {size:g}; it must be below {FARTHEST:g}: use other units.")
         self.length = _power_of_two(size)
         self.cube = size or 1.0
         self.unit_mass = _power_of_two(float(mass.sum()))
@@ -207,21 +212,26 @@ def _masses(values: ArrayLike, count: int) -> NDArray[np.float64]:
             f"m must have the shape ({count},), one mass per row of x, not {mass.shape}."
         )
     _check_finite(mass, "m")
-    if (mass < 0).any():
+    if mass.size and mass.min() < 0:
         i = int(np.argmax(mass < 0))
         raise ValueError(f"m[{i}] = {mass[i]:g}; masses must be at least 0.")
     return mass
 
 
 def _check_finite(values: NDArray[Any], name: str) -> None:
-    if not np.isfinite(values).all():
+    with np.errstate(all="ignore"):
+        doubtful = not np.isfinite(values.sum())
+    if doubtful and not np.isfinite(values).all():
         i = tuple(int(k) for k in np.argwhere(~np.isfinite(values))[0])
         place = ", ".join(str(k) for k in i)
         raise ValueError(f"{name}[{place}] = {values[i]}; all values must be finite.")
 
 
 def _number(value: float, name: str, at_least: float = -math.inf) -> float:
-    number = float(value)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a number, not {value!r}.") from None
     if not math.isfinite(number) or number < at_least:
         bound = "" if at_least == -math.inf else f" of at least {at_least:g}"
         raise ValueError(f"{name} = {number:g} must be a finite number{bound}.")
@@ -247,7 +257,8 @@ def _tolerance(tolerance: float | None, method: str, dtype: np.dtype[Any]) -> fl
     if not least <= number < 1.0:
         raise ValueError(
             f"tolerance = {number:g} must be below 1 and at least {least:g} for positions in "
-            f"{precision} precision" + ("; give x as float64." if number < least else ".")
+            f"{precision} precision"
+            + ("; give x as float64." if TIGHTEST["double"] <= number < least else ".")
         )
     return number
 
@@ -258,7 +269,8 @@ def _cube(*clouds: NDArray[Any]) -> tuple[NDArray[np.float64], float]:
     if not len(found):
         return np.zeros(3), 0.0
     low, high = found[:, :, 0].min(axis=0), found[:, :, 1].max(axis=0)
-    return low, float((high - low).max())
+    with np.errstate(over="ignore"):
+        return low, float((high - low).max())
 
 
 def _corners(cloud: NDArray[Any]) -> NDArray[np.float64]:

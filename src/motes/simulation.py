@@ -66,7 +66,9 @@ class Simulation:
             compiled = self._steppers[system.name].system
             widths = [(c.address, c.width) for c in compiled.columns]
             moves = compiled.motion.inertial
-            self._state.systems[system.name] = Particles(system.name, real, moves, widths)
+            self._state.systems[system.name] = Particles(
+                system.name, real, moves, widths, compiled.motion.remembers
+            )
         self.work = 0
         """Particle-steps taken so far."""
         self._run(self._lead_in, None)

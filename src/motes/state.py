@@ -37,6 +37,8 @@ class Particles:
     """Whether particles have a velocity of their own."""
     widths: Sequence[tuple[str, int]]
     """Addresses and widths of the columns drawn at birth."""
+    remembers: int = 0
+    """Numbers that a method keeps of every particle from step to step."""
     count: int = 0
     deaths: int = 0
     """How many have died so far; with the count it tells whether rows are still the same."""
@@ -49,6 +51,9 @@ class Particles:
     ids: NDArray[np.uint64] = field(init=False)
     columns: tuple[NDArray[Any], ...] = field(init=False)
     """Values drawn at birth, one array a component, in the order of `widths`."""
+
+    past: NDArray[Any] = field(init=False)
+    """What the method remembers, (remembers, capacity): its last row is 0 for who has no past."""
 
     def __post_init__(self) -> None:
         self._allocate(_roomy(SMALLEST))
@@ -67,12 +72,13 @@ class Particles:
         self.ids = allocate((rows,), np.uint64, what)
         width = sum(w for _, w in self.widths)
         self.columns = tuple(allocate((rows,), self.real, what) for _ in range(max(width, 1)))
+        self.past = allocate((self.remembers, rows), self.real, what)
 
     def arrays(self) -> list[NDArray[Any]]:
         """All columns as rows of numbers, in a fixed order."""
         drawn = self.columns if self.widths else ()
         velocity = list(self.velocity) if self.moves else []
-        return [*self.position, *velocity, self.birth, self.ids, *drawn]
+        return [*self.position, *velocity, self.birth, self.ids, *drawn, *self.past]
 
     def reserve(self, more: int) -> None:
         """Make room for more rows; capacity doubles, and what is alive is copied."""
@@ -83,6 +89,11 @@ class Particles:
         self._allocate(rows)
         for before, after in zip(old, self.arrays(), strict=True):
             after[: self.count] = before[: self.count]
+
+    def forget(self, rows: slice | NDArray[np.int64]) -> None:
+        """Give rows no past: they are new, or something happened to them within a step."""
+        if self.remembers:
+            self.past[-1, rows] = 0
 
     def append(
         self, position: NDArray[Any], velocity: NDArray[Any], birth: float, address: np.uint64
@@ -95,6 +106,7 @@ class Particles:
         if self.moves:
             self.velocity[:, new] = velocity
         self.birth[new] = birth
+        self.forget(new)
         _name(address, first, self.ids[new])
         self.count += more
 

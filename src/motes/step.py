@@ -130,6 +130,7 @@ class Stepper:
                 continue
             rows.reserve(count)
             self._write(rows, name, source, count)
+            rows.forget(slice(rows.count, rows.count + count))
             rows.count += count
 
     def _write(self, rows: Particles, name: str, source: Source, count: int) -> None:
@@ -176,7 +177,7 @@ class Stepper:
         """A kernel with the arrays that it works on, which are the same from step to step until
         there are more rows than they hold."""
         arrays = (
-            rows.position, rows.velocity, rows.birth, rows.columns, *self._marks(rows),
+            rows.position, rows.velocity, rows.birth, rows.columns, rows.past, *self._marks(rows),
             self.system.K,
         )  # fmt: skip
         known = self._steps.get(kernel)
@@ -199,6 +200,7 @@ class Stepper:
             )  # fmt: skip
 
         share(care, len(parts))
+        rows.forget(exceptional)
         self.impacts += sum(impacts)
 
     def rebounds(self, rows: Particles, ends: NDArray[Any], alive: int, interval: Interval) -> bool:
@@ -232,6 +234,7 @@ class Stepper:
             )  # fmt: skip
 
         share(care, len(parts))
+        rows.forget(threatened)
         self.impacts += sum(hits for hits, _ in counts)
         return any(changed for _, changed in counts)
 

@@ -218,23 +218,37 @@ class Rosenbrock:
     symplectic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
+        lower, alpha = self.plain
+        _check_sums(self.c, alpha)
+        _check_sums(self.g, lower)
+        _check_order("", self.order, _times(self.b, lower), self.weight)
+        _check_order("embedded method: ", self.low_order, _times(self.b_low, lower), self.weight)
+
+    @property
+    def plain(self) -> tuple[list[list[float]], list[list[float]]]:
+        """Gamma and alpha for k in place of u: the inverse of 1/gamma - d, and a Gamma."""
         s = range(self.stages)
-        # From u back to k: Gamma is the inverse of 1/gamma - d, alpha = a Gamma, weights = b Gamma.
         lower = [[0.0] * self.stages for _ in s]
         for i in s:
             lower[i][i] = self.gamma
             for j in range(i):
                 inner = sum(self.d[i][m] * lower[m][j] for m in range(j, i))
                 lower[i][j] = self.gamma * inner
-        alpha = [_times(row, lower) for row in self.a]
-        _check_sums(self.c, alpha)
-        _check_sums(self.g, lower)
-        weight = rooted_trees.weight(
-            alpha,
-            [[x + y for x, y in zip(p, q, strict=True)] for p, q in zip(alpha, lower, strict=True)],
+        return lower, [_times(row, lower) for row in self.a]
+
+    @property
+    def weight(self) -> rooted_trees.Weight:
+        """What stages weigh in the conditions of a tree."""
+        lower, alpha = self.plain
+        both = zip(alpha, lower, strict=True)
+        return rooted_trees.weight(
+            alpha, [[x + y for x, y in zip(p, q, strict=True)] for p, q in both]
         )
-        _check_order("", self.order, _times(self.b, lower), weight)
-        _check_order("embedded method: ", self.low_order, _times(self.b_low, lower), weight)
+
+    @property
+    def weights(self) -> list[float]:
+        """Weights of the k in y1."""
+        return _times(self.b, self.plain[0])
 
     @property
     def stages(self) -> int:
@@ -259,8 +273,17 @@ class Nystrom:
     symplectic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        weight = rooted_trees.nystrom_weight(self.c, self.a)
-        _check_nystrom(self.order, self.b, self.b_position, weight)
+        _check_nystrom(self.order, self.b, self.b_position, self.weight)
+
+    @property
+    def weight(self) -> rooted_trees.Weight:
+        """What stages weigh in the conditions of a tree."""
+        return rooted_trees.nystrom_weight(self.c, self.a)
+
+    @property
+    def ends(self) -> tuple[Numbers, Numbers]:
+        """Weights of the accelerations in position and velocity at the end."""
+        return self.b_position, self.b
 
     @property
     def stages(self) -> int:
@@ -287,11 +310,22 @@ class Splitting:
     def __post_init__(self) -> None:
         if len(self.kicks) != len(self.drifts) + 1:
             raise TableauError("a splitting has one kick more than drifts; the last may be 0")
-        c, d = self.times, self.kicks
         _check("drifts: ", 1, 1, self.drifts, [1.0] * len(self.drifts), 1.0)
+        b_position, b = self.ends
+        _check_nystrom(self.order, b, b_position, self.weight)
+
+    @property
+    def weight(self) -> rooted_trees.Weight:
+        """What kicks weigh in the conditions of a tree."""
+        c, d = self.times, self.kicks
         a = [[d[j] * (c[i] - c[j]) for j in range(i)] for i in range(len(d))]
-        positions = [kick * (1 - time) for kick, time in zip(d, c, strict=True)]
-        _check_nystrom(self.order, d, positions, rooted_trees.nystrom_weight(c, a))
+        return rooted_trees.nystrom_weight(c, a)
+
+    @property
+    def ends(self) -> tuple[Numbers, Numbers]:
+        """Weights of the accelerations in position and velocity at the end."""
+        left = [1 - time for time in self.times]
+        return tuple(k * t for k, t in zip(self.kicks, left, strict=True)), self.kicks
 
     @property
     def stages(self) -> int:
@@ -326,11 +360,8 @@ class BackwardDifference:
             _check("", self.order, m, self.a, powers, float(m == 1))
 
 
-Method = Explicit | Splitting | Implicit
-"""Tables that scenes can be compiled with; of implicit ones, those solved stage by stage."""
-
-Table = Method | Rosenbrock | Nystrom | BackwardDifference
-"""All tables, for `motes.ode`."""
+Table = Explicit | Splitting | Implicit | Rosenbrock | Nystrom | BackwardDifference
+"""A method of any family."""
 
 
 def composed(order: int, weights: Sequence[float]) -> Splitting:

@@ -12,7 +12,27 @@ from both_ways import WITH_COMPILER, compiled, same
 from motes.errors import SceneError
 from motes.jit import STRICT, jit
 from motes.machine.lanes import bits as marks_of
-from motes.machine.lanes import count, lowest, pack, put, settled, take
+from motes.machine.lanes import (
+    choose,
+    largest,
+    lowest,
+    put,
+    put_some,
+    rough_inverse_root,
+    settled,
+    spread_over,
+    take,
+    total,
+)
+from motes.machine.traced import (
+    LANES,
+    gathered,
+    inverse_root,
+    ones,
+    scattered,
+    traced,
+    write_totals,
+)
 
 pytestmark = WITH_COMPILER
 
@@ -70,11 +90,9 @@ def test_marked_lanes_are_packed(
         monkeypatch.setattr(target, "moves_lanes", lambda: False)
 
     def pack_some(x: Any, limit: Any, out: Any) -> Any:
-        held = np.uint64(0)
+        held = 0
         for i in range(0, x.size, 8):
-            marks = marks_of(take(x, i, 8) < limit)
-            pack(out, held, take(x, i, 8), marks)
-            held += count(marks)
+            held += put_some(out, held, take(x, i, 8), take(x, i, 8) < limit)
         return held
 
     marked = np.unpackbits(np.arange(256, dtype=np.uint8)).astype(bool)
@@ -84,8 +102,7 @@ def test_marked_lanes_are_packed(
         held = compiled(pack_some)(x, kind(40), out)
         assert held == marked.sum()
         np.testing.assert_array_equal(out[:held], x[marked])
-    assert count(np.uint64(0b1011)) == 3
-    pack(out, 5, out[0], np.uint64(1))
+    assert (put_some(out, 5, out[0], False), put_some(out, 5, out[0], True)) == (0, 1)
     assert out[5] == out[0]
 
 
@@ -129,3 +146,70 @@ def test_vectors_change_lanes_as_plain_python_says(real):
     assert found == near(x, limit, slots, places[1])
     assert 3 < found < 64
     assert (places[0][:found] == places[1][:found]).all()
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_lanes_are_summed_compared_and_kept_as_arrays_are(real: Any) -> None:
+    """A kernel of eight lanes, and the same function in plain Python, whose lanes are an array."""
+
+    def parts(x: Any, names: Any, kept: Any, out: Any) -> Any:
+        found = 0
+        for i in range(0, x.size, 8):
+            lanes = take(x, i, 8)
+            positive = choose(lanes > 0, lanes, -2 * lanes)
+            put(out, i, positive + spread_over(x[i], 8))
+            found += put_some(kept, found, take(names, i, 8), lanes > 0.25)
+            out[i] += total(positive) - largest(lanes)
+        return found
+
+    rng = np.random.default_rng(5)
+    # Multiples of 1/16: sums are exact in any order.
+    x = (rng.integers(-32, 32, 64) / 16).astype(real)
+    names = np.arange(100, 164, dtype=np.int32)
+    kept, expected = np.zeros((2, 72), np.int32)
+    out, plain = np.zeros((2, 64), real)
+    count = compiled(parts)(x, names, kept, out)
+    assert count == parts(x, names, expected, plain) == (x > 0.25).sum()
+    np.testing.assert_array_equal(kept[:count], names[x > 0.25])
+    np.testing.assert_array_equal(out, plain)
+
+
+def test_an_estimated_root_has_eleven_bits() -> None:
+    def roots(x: Any, out: Any) -> None:
+        for i in range(0, x.size, 8):
+            put(out, i, rough_inverse_root(take(x, i, 8)))
+
+    x = np.geomspace(1e-30, 1e30, 4096, dtype=np.float32)
+    out = np.zeros_like(x)
+    compiled(roots)(x, out)
+    np.testing.assert_allclose(out * np.sqrt(x.astype(float)), 1, rtol=2.0**-11)
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_a_traced_formula_does_what_it_does_with_arrays(real: Any) -> None:
+    """Columns of chosen rows of tables, arithmetic with lanes and numbers, rows written back."""
+
+    @traced
+    def formula(table: Any, chosen: Any, factor: Any, rows_: Any, sums: Any, out: Any) -> Any:
+        columns = gathered(table, chosen, 6)
+        value = columns[0] * factor - columns[5] * 0.5 + rows_[1]
+        write_totals(sums, [value, -columns[3]])
+        scattered([value, columns[1], columns[2]], out, 3)
+        rows_[0] = ones(value) / (value * value + 1.0)
+        return value, inverse_root(value * value + 2.0)
+
+    def call(table: Any, chosen: Any, factor: Any, rows_: Any, sums: Any, out: Any) -> None:
+        value, root = formula(table, chosen, factor, rows_, sums, out)
+        put(rows_[2], 0, value * root)
+
+    rng = np.random.default_rng(6)
+    table = (rng.integers(-64, 64, (40, 8)) / 16).astype(real)
+    chosen = rng.integers(0, 40, LANES).astype(np.int32)
+    found = rng.integers(-8, 8, (3, LANES)).astype(real), np.zeros(2, real)
+    found += (np.zeros((LANES + 4, LANES), real),)
+    plain = tuple(array.copy() for array in found)
+    compiled(call)(table, chosen, real(0.25), *found)
+    call(table, chosen, real(0.25), *plain)
+    for one, other in zip(found, plain, strict=True):
+        few = one[:, :3] if one.shape[0] == LANES + 4 else one
+        np.testing.assert_allclose(few, other[:, :3] if few is not one else other, rtol=1e-6)

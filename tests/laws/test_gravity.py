@@ -181,6 +181,8 @@ X, M = np.zeros((3, 3)), np.ones(3)
         ((X, M), {"tolerance": 1.0}, "tolerance = 1 must be below 1"),
         ((X, M), {"tolerance": 1e-11}, "at least 1e-10 for positions in double precision"),
         ((X.astype(np.float32), M), {"tolerance": 1e-7}, "at least 1e-06 .* give x as float64"),
+        ((X, M), {"tolerance": "small"}, "tolerance must be a number, not 'small'"),
+        ((np.diag([0.0, 0.0, 1e200]), M), {}, "x spans .*; it must be below 1e.150"),
         ((X, M), {"targets": np.zeros(3)}, "targets must have the shape"),
     ],
 )

@@ -9,7 +9,8 @@ from test_gravity import plummer_sphere
 from motes import gravity
 from motes.interact.gravity.expansions import folded, terms
 from motes.interact.gravity.multipole import Plan, Problem
-from motes.interact.gravity.tree import NUMBER, Box, octree, summarize
+from motes.interact.gravity.tree import NUMBER, Box, octree
+from motes.interact.gravity.upward import summarize
 
 
 def distributions(n):
@@ -113,7 +114,7 @@ def test_the_error_falls_with_the_order(law, orders):
     exact = gravity.acceleration(x, m, softening=size, softening_kernel="plummer")
     errors = []
     for order in orders:
-        plan = Plan(order=order, leaf=16, real=np.float64, opening=0.5)
+        plan = Plan(order=order, low=order, leaf=16, real=np.float64, opening=0.5)
         problem = Problem.build(x, m, None, box(x), law, size, True, plan)
         sums = problem.unsorted(problem.solve(problem.limits(np.inf, np.inf, np.inf)))
         errors.append(relative(sums[:3].T, exact))

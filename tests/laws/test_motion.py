@@ -34,35 +34,6 @@ def keys(*pairs: tuple[float, object]) -> dict:
     return {"over": "time", "keys": [list(p) for p in pairs], "interpolation": "smooth"}
 
 
-ORDERS = {
-    "euler": 1, "semi_implicit_euler": 1, "midpoint": 2, "heun": 2, "leapfrog": 2, "rk4": 4,
-    "backward_euler": 1, "trapezoid": 2,
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("integrator", "order"), ORDERS.items())
-def test_error_falls_with_the_methods_order(integrator: str, order: int) -> None:
-    """|x_h - x| = C h^p, with forces that follow curves over time and depend on the position."""
-    forces = [
-        motes.force.Gravity(g=keys((-1.0, [0.0, 0.0, -4.0]), (2.0, [1.0, 0.0, 3.0]))),
-        motes.force.Attractor(
-            strength=keys((-1.0, 3.0), (2.0, 8.0)),
-            position=keys((-1.0, [1.0, 0.0, 0.0]), (2.0, [0.0, 1.5, 0.0])),
-            softening=0.5,
-        ),
-    ]
-
-    def end(step: float, method: str = integrator) -> np.ndarray:
-        sim = one_particle(velocity=(0.5, 0.2, 1.0), force=forces, integrator=method, step=step)
-        sim.run(until=1.0)
-        return sim["ball"].position[0].copy()
-
-    exact = end(1 / 2048, "rk4")
-    steps = (1 / 128, 1 / 256) if order == 4 else (1 / 512, 1 / 1024)
-    coarse, fine = (np.linalg.norm(end(h) - exact) for h in steps)
-    assert math.log2(coarse / fine) == pytest.approx(order, abs=0.25)
-
-
 def test_euler_leaves_the_circle_by_its_exact_factor() -> None:
     """On x' = (-y, x) Euler multiplies the radius by sqrt(1 + h^2) every step."""
     step, n = 0.05, 100

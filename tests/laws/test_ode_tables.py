@@ -8,8 +8,8 @@ import math
 import pytest
 
 from motes import rooted_trees
-from motes.errors import SceneError
 from motes.integrate import method, methods
+from motes.ode.stability import error_constant
 from motes.tableau import Explicit, Implicit, Splitting, TableauError
 
 NUMBERS = ("a", "a_explicit", "b", "b_position", "c", "d", "drifts", "g", "kicks")
@@ -114,17 +114,13 @@ def test_rows_of_implicit_tables_are_whole():
             assert table.diagonal == diagonal
 
 
-def test_scenes_refuse_what_they_cannot_run():
-    """Each with its reason, and with methods that scenes take instead."""
-    reasons = {
-        "bdf2": "remembers the step before",
-        "nystrom5": "without drag or wind",
-        "radau5": "stages are solved together",
-        "rodas4": "derivatives",
-    }
+def test_error_constants_are_those_of_the_books():
+    """Euler 1/2; bdf2 1/3; leapfrog: sqrt of the squares of its three third-order defects."""
+    assert error_constant(method("euler")) == pytest.approx(1 / 2)
+    assert error_constant(method("bdf2")) == pytest.approx(1 / 3)
+    # Velocity: sum b c^2 - 1/3 and sum b_i a_ij - 1/6; position: sum b_position c - 1/6.
+    assert error_constant(method("leapfrog")) == pytest.approx(
+        math.hypot(1 / 2 - 1 / 3, 1 / 4 - 1 / 6, 0 - 1 / 6)
+    )
     for name, table in methods().items():
-        if name not in reasons:
-            assert method(name) is table
-        else:
-            with pytest.raises(SceneError, match=f"{reasons[name]}.*of these, sdirk2"):
-                method(name)
+        assert error_constant(table) > 1e-7, name

@@ -107,8 +107,8 @@ def test_folding_follows_what_a_literal_implies() -> None:
     from motes.kernel.language import Translation
 
     known = {
-        key: tuple(float(v) for v in control.values)
-        for key, control in Vortex().values.items()
+        key: tuple(float(v) for v in Vortex().values[key].values)
+        for key in Vortex.own
         if key != "strength"
     }
     translation = Translation()

@@ -71,7 +71,7 @@ def test_steps_and_methods_that_come_twice_count_once(tmp_path: Path):
 
     figure = draw("kepler", methods=["rk4", "rk4", "euler"], steps=[0.05, 0.05, 0.025])
     errors = figure.axes[1]
-    assert [line.get_label() for line in errors.lines] == ["rk4: 4.6", "euler: far off"]
+    assert [line.get_label() for line in errors.lines] == ["rk4, slope 4.6", "euler, far off"]
     assert [len(line.get_xdata()) for line in errors.lines] == [2, 2]
 
 

@@ -6,7 +6,7 @@ import ast
 import inspect
 import linecache
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import lru_cache
 from itertools import pairwise
@@ -70,6 +70,19 @@ def class_source(cls: type) -> str:
     if located is None:
         return repr({k: f.__code__.co_code for k, f in vars(cls).items() if hasattr(f, "__code__")})
     return ast.get_source_segment(located[1], located[0]) or ""
+
+
+def fields_read(function: Callable[..., Any], argument: int, all_fields: Iterable[str]) -> set[str]:
+    """What a kernel reads of an argument: names of fields, all where it passes it on as a whole."""
+    node = function_node(getattr(function, "py_func", function))
+    name = node.args.args[argument].arg
+    parents = [n for n in ast.walk(node) if isinstance(n, ast.Attribute)]
+    read = {n.attr for n in parents if isinstance(n.value, ast.Name) and n.value.id == name}
+    inside = {id(n.value) for n in parents}
+    whole = any(
+        isinstance(n, ast.Name) and n.id == name and id(n) not in inside for n in ast.walk(node)
+    )
+    return read | (set(all_fields) if whole else set())
 
 
 def function_node(function: Callable[..., Any]) -> ast.FunctionDef:

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from motes.compile.advance import stage_times
 from motes.compile.encounter import encounter_kernel, poses_at
-from motes.compile.motion import Motion, stage_times
+from motes.compile.motion import Motion
 from motes.compile.surfaces import Surfaces
 from motes.compile.text import STATE, Text
 from motes.jit import EXACT, jit

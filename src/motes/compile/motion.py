@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-
-import numpy as np
 
 from motes.catalog import Component
-from motes.compile import implicit
+from motes.catalog.source import fields_read
 from motes.compile.surfaces import write_surfaces
 from motes.compile.text import AXES, STATE, Call, Text, packed
 from motes.control.control import Control
 from motes.errors import SceneError
-from motes.tableau import Explicit, Implicit, Method, Splitting
+from motes.tableau import (
+    BackwardDifference,
+    Implicit,
+    Table,
+)
 
 PARTICLE = {"age": "age", "id": "id", "obstacle": "obstacle"}
 """Columns of `q` that the engine computes itself."""
@@ -50,7 +51,7 @@ class Motion:
     retire: tuple[tuple[str, Component], ...]
     traits: dict[str, tuple[str, Control]]
     """Values of the system by name (life, mass, size, color): address and control."""
-    method: Method
+    method: Table
     solids: tuple[tuple[str, Component], ...] = ()
     """The scene's solids, for forces that need to see obstacles."""
 
@@ -63,6 +64,31 @@ class Motion:
     def inertial(self) -> bool:
         """Whether particles have a velocity of their own: all but those that flows alone carry."""
         return bool(self.forces) or not self.flows
+
+    @property
+    def split(self) -> bool:
+        """Whether the method takes forces that are declared stiff implicitly, others explicitly."""
+        pair = isinstance(self.method, Implicit) and bool(self.method.a_explicit)
+        return pair and any(_stiff(c) for _, c in self.forces)
+
+    @property
+    def remembers(self) -> int:
+        """Numbers that a particle keeps from step to step, for the method's sake."""
+        return 7 if isinstance(self.method, BackwardDifference) else 0
+
+    @property
+    def follows_velocity(self) -> str:
+        """Address of something because of which x'' depends on the velocity, or nothing."""
+        for address, c in (*self.flows, *self.forces):
+            kernel = c.kernel("acceleration")
+            if kernel is None:  # A flow, a relaxation, a limit.
+                return address
+            if set(STATE[3:]) & fields_read(kernel, 1, STATE):
+                return address
+            by_speed = [k for k, v in c.values.items() if getattr(v, "over", "") == "speed"]
+            if by_speed:
+                return f"{address}.{by_speed[0]}"
+        return ""
 
     @property
     def relaxes(self) -> bool:
@@ -80,20 +106,10 @@ class Motion:
         return {need for _, component in parts for need in component.needs}
 
 
-def write_motion(text: Text, motion: Motion) -> None:
-    """Write `rate`, or `kick` and `drift`, and `advance` into the text.
-
-    `advance(x, ..., age, C, S_0, ..., L, t_0, ..., h)` takes one particle through a step of length
-    h; S_i and t_i are the scene's values and the time at the method's i-th stage.
-    """
+def write_right_hand_side(text: Text, motion: Motion) -> None:
+    """Write `carried`, `pushed` and, where particles retire, `dies` into the text."""
     writer = _Writer(text, motion)
     writer.right_hand_side()
-    if isinstance(motion.method, Explicit):
-        writer.explicit(motion.method)
-    elif isinstance(motion.method, Implicit):
-        writer.implicit(motion.method)
-    else:
-        writer.splitting(motion.method)
     if motion.mortal:
         writer.dies()
 
@@ -103,17 +119,6 @@ def write_potential(text: Text, motion: Motion) -> None:
     writer = _Writer(text, motion)
     writer.right_hand_side()  # Registers the system's columns in the order in which it keeps them.
     writer.potential()
-
-
-def stage_times(method: Method) -> tuple[float, ...]:
-    """Times at which the scene's values are needed, as shares of the step."""
-    if isinstance(method, Explicit):
-        return method.c
-    if isinstance(method, Implicit):
-        return tuple(method.c[i] for i in implicit.stages(method))
-    kicks = method.times
-    middles = [(a + b) / 2 for a, b in pairwise(kicks)]
-    return tuple(sorted({*kicks, *middles}))
 
 
 class _Writer:
@@ -181,13 +186,12 @@ class _Writer:
             self.text.add(SEEN if self.motion.solids else NOTHING_SEEN)
         arguments = ", ".join(STATE)
         calls = [self._call(address, c, "velocity") for address, c in self.motion.flows]
-        direct: list[Call] = []
-        relaxing: list[Call] = []
-        for address, c in self.motion.forces:
-            for name, found in (("acceleration", direct), ("relaxation", relaxing)):
-                if c.kernel(name) is not None:
-                    found.append(self._call(address, c, name))
-                    break
+        split, parts = self.motion.split, dict[str, str]()
+        for name in ("pushed", "mild") if split else ("pushed",):
+            wanted = [
+                f for f in self.motion.forces if not split or _stiff(f[1]) == (name == "pushed")
+            ]
+            parts[name] = self._pushed(wanted)
         if "life" in self.text.values.over:
             self._life()
         head = f"({arguments}, age, C, S, L, t):\n{self._preamble()}"
@@ -196,6 +200,20 @@ class _Writer:
             + self._sum(calls, ("ux", "uy", "uz"))
             + "    return ux, uy, uz\n"
         )
+        for name, body in parts.items():
+            self.text.add(f"@inline\ndef {name}{head}{body}    return ax, ay, az, k, bx, by, bz\n")
+        if self.motion.limits:
+            self._limits(arguments)
+
+    def _pushed(self, forces: Sequence[tuple[str, Component]]) -> str:
+        """Source that adds up forces: an acceleration, and all relaxations as k v against b."""
+        direct: list[Call] = []
+        relaxing: list[Call] = []
+        for address, c in forces:
+            for name, found in (("acceleration", direct), ("relaxation", relaxing)):
+                if c.kernel(name) is not None:
+                    found.append(self._call(address, c, name))
+                    break
         body = self._sum(direct, ("ax", "ay", "az"))
         body += "    k = F(0.0)\n    bx = F(0.0)\n    by = F(0.0)\n    bz = F(0.0)\n"
         for call in relaxing:
@@ -205,9 +223,7 @@ class _Writer:
                 for i, axis in enumerate(AXES, 1)
                 if not call.always_zero(i)
             )
-        self.text.add(f"@inline\ndef pushed{head}{body}    return ax, ay, az, k, bx, by, bz\n")
-        if self.motion.limits:
-            self._limits(arguments)
+        return body
 
     def _limits(self, arguments: str) -> None:
         """`limited`: what the body can do of a sum of accelerations."""
@@ -219,127 +235,6 @@ class _Writer:
         self.text.add(
             f"@inline\ndef limited({arguments}, age, C, S, L, t, ax, ay, az):\n"
             f"{lines}    return ax, ay, az\n"
-        )
-
-    def _slopes(self, i: int, state: tuple[str, ...], share: float) -> str:
-        """Source for the slopes k of stage i at a state."""
-        call = f"({', '.join(state)}, age + F({share!r}) * h, C, S{i}, L, t{i})"
-        velocity = state[3:]
-        lines = f"    ux{i}, uy{i}, uz{i} = carried{call}\n" if self.motion.flows else ""
-        if not self.motion.inertial:
-            return lines
-        for axis, v in zip(AXES, velocity, strict=True):
-            flow = f" + u{axis}{i}" if self.motion.flows else ""
-            lines += f"    k{axis}{i} = {v}{flow}\n"
-        lines += f"    ax{i}, ay{i}, az{i}, r, bx, by, bz = pushed{call}\n"
-        if self.motion.limits:
-            a = f"ax{i}, ay{i}, az{i}"
-            lines += f"    {a} = limited{call[:-1]}, {a})\n"
-        for axis, v in zip(AXES, velocity, strict=True):
-            lines += f"    a{axis}{i} += b{axis} - r * {v}\n"
-        return lines
-
-    def explicit(self, method: Explicit) -> None:
-        """`advance` from a Butcher tableau."""
-        if self.motion.inertial and not self.motion.flows:
-            self._nystrom(method)
-            return
-        lines = ""
-        slope = "k" if self.motion.inertial else "u"
-        for i, row in enumerate(method.a):
-            state = []
-            for axis in AXES:
-                state.append(_combine(axis, row, slope, axis))
-            for axis in AXES:
-                moved = row if self.motion.inertial else ()
-                state.append(_combine(f"v{axis}", moved, "a", axis))
-            names = tuple(f"{n}_{i}" for n in STATE)
-            lines += "".join(f"    {n} = {e}\n" for n, e in zip(names, state, strict=True))
-            lines += self._slopes(i, names, method.c[i])
-        ends = [_combine(axis, method.b, slope, axis) for axis in AXES]
-        if self.motion.inertial:
-            ends += [_combine(f"v{axis}", method.b, "a", axis) for axis in AXES]
-        else:
-            ends += ["vx", "vy", "vz"]
-        self._advance(method, lines, ends)
-
-    def _nystrom(self, method: Explicit) -> None:
-        """The same table where x' = v, with the velocities of its stages put in.
-
-        x_i = x + c_i h v + h^2 sum_j (A A)_ij a_j and v_i = v + h sum_j A_ij a_j: fewer sums, and
-        less that a SIMD loop must keep at hand. (Hairer, Norsett, Wanner I, section II.14.)
-        """
-        full = [[*row, *(0.0,) * (method.stages - len(row))] for row in method.a]
-        table = np.array([*full, method.b])
-        places, squares = (*method.c, 1.0), table @ table[:-1]
-        lines, stages = "    h2 = h * h\n", []
-        for place, row, square in zip(places, table, squares, strict=True):
-            start = [f"{a} + F({float(place)!r}) * h * v{a}" if place else a for a in AXES]
-            state = [_sum(s, square, "h2", a) for s, a in zip(start, AXES, strict=True)] + [
-                _sum(f"v{a}", row, "h", a) for a in AXES
-            ]
-            stages.append(state)
-        for i, state in enumerate(stages[:-1]):
-            names = tuple(f"{n}_{i}" for n in STATE)
-            lines += "".join(f"    {n} = {e}\n" for n, e in zip(names, state, strict=True))
-            lines += self._slopes(i, names, method.c[i])
-        self._advance(method, lines, stages[-1])
-
-    def implicit(self, method: Implicit) -> None:
-        """`advance` with Newton's method for each stage."""
-        if not self.motion.inertial:
-            raise SceneError(
-                "an implicit integrator is for forces; give a system that flows alone carry another"
-            )
-        self.text.add(implicit.settle_text(self.text.precision))
-        self._advance(method, *implicit.advance_lines(method))
-
-    def splitting(self, method: Splitting) -> None:
-        """`advance` as kicks and drifts; relaxations are exact, so that no step explodes."""
-        places = stage_times(method)
-        lines = ""
-        for kick, drift, begin in zip(
-            method.kicks, (*method.drifts, 0.0), method.times, strict=True
-        ):
-            if kick and self.motion.inertial:
-                i = places.index(begin)
-                lines += self._kick(kick, i, begin)
-            if drift:
-                lines += self._drift(drift, begin, places)
-        self._advance(method, lines, list(STATE))
-
-    def _kick(self, share: float, i: int, begin: float) -> str:
-        call = f"({', '.join(STATE)}, age + F({begin!r}) * h, C, S{i}, L, t{i})"
-        lines = f"    ax, ay, az, r, bx, by, bz = pushed{call}\n"
-        if self.motion.limits:
-            lines += f"    ax, ay, az = limited{call[:-1]}, ax, ay, az)\n"
-        lines += f"    g = F({share!r}) * h\n"
-        if self.motion.relaxes:
-            lines += "    g *= phi1(r * g)\n"
-        return lines + "".join(
-            f"    v{axis} += g * (a{axis} + b{axis} - r * v{axis})\n" for axis in AXES
-        )
-
-    def _drift(self, share: float, begin: float, places: tuple[float, ...]) -> str:
-        lines = f"    d = F({share!r}) * h\n"
-        if not self.motion.flows:
-            return lines + "".join(f"    {axis} += d * v{axis}\n" for axis in AXES)
-        first, middle = places.index(begin), places.index(begin + share / 2)
-        age = f"age + F({begin!r}) * h"
-        own = {axis: f"v{axis} + " if self.motion.inertial else "" for axis in AXES}
-        lines += f"    ux, uy, uz = carried({', '.join(STATE)}, {age}, C, S{first}, L, t{first})\n"
-        lines += "".join(f"    m{a} = {a} + F(0.5) * d * ({own[a]}u{a})\n" for a in AXES)
-        lines += f"    ux, uy, uz = carried(mx, my, mz, vx, vy, vz, {age} + F(0.5) * d, "
-        lines += f"C, S{middle}, L, t{middle})\n"
-        return lines + "".join(f"    {a} += d * ({own[a]}u{a})\n" for a in AXES)
-
-    def _advance(self, method: Method, lines: str, ends: list[str]) -> None:
-        stages = range(len(stage_times(method)))
-        scene = ", ".join(f"S{i}" for i in stages)
-        times = ", ".join(f"t{i}" for i in stages)
-        self.text.add(
-            f"@inline\ndef advance({', '.join(STATE)}, age, C, {scene}, L, {times}, h):\n"
-            f"{lines}    return {', '.join(ends)}\n"
         )
 
     def potential(self) -> None:
@@ -360,13 +255,6 @@ class _Writer:
         )
 
 
-def _sum(start: str, weights: Sequence[float], scale: str, axis: str) -> str:
-    """`start + (w_0 scale) a_0 + (w_1 scale) a_1 ...` without the zero terms."""
-    terms = [f"F({float(w)!r}) * {scale} * a{axis}{j}" for j, w in enumerate(weights) if w != 0]
-    return " + ".join([start, *terms])
-
-
-def _combine(start: str, weights: tuple[float, ...], slope: str, axis: str) -> str:
-    """`start + h * (w_0 slope_0 + w_1 slope_1 ...)` without the zero terms."""
-    terms = [f"F({float(w)!r}) * {slope}{axis}{j}" for j, w in enumerate(weights) if w != 0]
-    return f"{start} + h * ({' + '.join(terms)})" if terms else start
+def _stiff(force: Component) -> bool:
+    """Whether a force is declared stiff."""
+    return bool(force.values["stiff"].document())

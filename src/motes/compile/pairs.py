@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.catalog import Component
-from motes.catalog.source import function_node
+from motes.catalog.source import fields_read, function_node
 from motes.compile.text import AXES, STATE, Text, packed
 from motes.control.constant import Constant, Setting
 from motes.errors import SceneError
@@ -148,15 +148,7 @@ class Law:
 
     def _read(self, function: Callable[..., Any], argument: int) -> set[str]:
         """What a kernel reads of its argument; all that there is where it passes it on."""
-        node = function_node(getattr(function, "py_func", function))
-        name = node.args.args[argument].arg
-        parents = [n for n in ast.walk(node) if isinstance(n, ast.Attribute)]
-        read = {n.attr for n in parents if isinstance(n.value, ast.Name) and n.value.id == name}
-        inside = {id(n.value) for n in parents}
-        whole = any(
-            isinstance(n, ast.Name) and n.id == name and id(n) not in inside for n in ast.walk(node)
-        )
-        return read | ({*STATE, *self.part.needs} if whole else set())
+        return fields_read(function, argument, {*STATE, *self.part.needs})
 
     # ------------------------------------------------------------------ kernels
 

@@ -8,18 +8,21 @@ from __future__ import annotations
 
 from typing import Any
 
+from motes.compile.advance import stage_times
 from motes.compile.motion import Motion
 from motes.compile.straight import HELD
 from motes.compile.surfaces import Surfaces
 from motes.compile.text import AXES, STATE, Text
 from motes.jit import jit
-from motes.tableau import Implicit, Splitting
+from motes.tableau import BackwardDifference, Explicit, Implicit, Nystrom, Rosenbrock, Splitting
 
 
 def write_staged(text: Text, motion: Motion) -> None:
-    """Write `slope` (for Runge-Kutta methods), `settled` (implicit ones), `kick` and `drift`.
+    """Write `slope` (Runge-Kutta methods), `settled` or `led` (implicit ones), `kick` and `drift`.
 
-    `settled` solves a stage of each row with its push given: Y becomes base + dt f(Y).
+    `settled` solves a stage of each row with its push given: Y becomes base + dt f(Y). Where stages
+    belong together it finds the slopes of all of them, from base, with a push for each. `eased` is
+    what a split method takes explicitly.
     """
     columns = sum(c.width for c in text.values.columns)
     names = [f"c{i}" for i in range(columns)]
@@ -45,19 +48,58 @@ def write_staged(text: Text, motion: Motion) -> None:
         text.add(f"@kernel\ndef drift{head}{slices}{begin}{_drift(motion, flows, row)}")
         return
     outputs = "".join(f"    k{n} = slope_[{k}][lo:hi]\n" for k, n in enumerate(STATE))
-    change = "".join(
-        f"        k{a}[i] = v{a}[i]{f' + u{a}' if flows else ''}\n"
-        f"        kv{a}[i] = a{a} + b{a} - r * v{a}[i]\n"
-        for a in AXES
-    )
-    head = "@kernel\ndef slope(Y, birth, columns, push, slope_, K, t, lo, hi):\n"
-    text.add(head + slices + outputs + begin + flows + pushed + change)
-    if isinstance(motion.method, Implicit):
-        bases = "".join(f"    p{n} = base[{k}][lo:hi]\n" for k, n in enumerate(STATE))
-        known = ", ".join(f"p{n}[i]" for n in STATE)
-        body = f"        {row} = settle({known}, gx[i], gy[i], gz[i], g, age, C, S, L, now)\n"
-        head = "@kernel\ndef settled(Y, birth, columns, push, base, K, t, dt, lo, hi):\n"
-        text.add(head + slices + bases + "    g = F(dt)\n" + begin + body)
+    moved = "".join(f"        k{a}[i] = v{a}[i]{f' + u{a}' if flows else ''}\n" for a in AXES)
+    change = "".join(f"        kv{a}[i] = a{a} + b{a} - r * v{a}[i]\n" for a in AXES)
+    head = "(Y, birth, columns, push, slope_, K, t, lo, hi):\n" + slices + outputs + begin
+    text.add(f"@kernel\ndef slope{head}{flows}{moved}{pushed}{change}")
+    if motion.split:
+        still = "".join(f"        k{a}[i] = F(0.0)\n" for a in AXES)
+        mild = pushed.replace("pushed(", "mild(")
+        text.add(f"@kernel\ndef eased{head}{still}{mild}{change}")
+    if not isinstance(motion.method, Explicit | Nystrom):
+        text.add(_settled(motion, slices, begin, row))
+
+
+def _settled(motion: Motion, slices: str, begin: str, row: str) -> str:
+    """Source of `settled`."""
+    method = motion.method
+    head = "(Y, birth, columns, push, base, K, t, dt, lo, hi):\n"
+    slices += "".join(f"    p{n} = base[{k}][lo:hi]\n" for k, n in enumerate(STATE))
+    known, push = [f"p{n}[i]" for n in STATE], "gx[i], gy[i], gz[i]"
+    lines = "    g = F(dt)\n"
+    if isinstance(method, Implicit) and not method.diagonal:
+        head = head.replace("base, ", "base, slope_, ")
+        m, body = len(stage_times(method)), ""
+        lines = f"    h, k, G = F(dt), empty({6 * m}, F), empty({3 * m}, F)\n"
+        for j, place in enumerate(stage_times(method)):
+            lines += f"    S{j}, t{j} = scene(K, t + {place!r} * dt), F(t + {place!r} * dt)\n"
+        body = f"        for j in range({3 * m}):\n            G[j] = push[j, lo + i]\n"
+        scene, times = (", ".join(f"{c}{j}" for j in range(m)) for c in "St")
+        body += f"        together({', '.join(known)}, G, k, h, age, C, {scene}, L, {times})\n"
+        body += f"        for j in range({6 * m}):\n            slope_[j, lo + i] = k[j]\n"
+    elif isinstance(method, BackwardDifference):
+        head = head.replace("base, ", "base, past, ")
+        slices += "".join(f"    q{k} = past[{k}][lo:hi]\n" for k in range(motion.remembers))
+        body = "        c, w = weights_of_past(g, q6[i])\n"
+        start = ", ".join(f"{n} + c * q{k}[i]" for k, n in enumerate(known))
+        body += f"        {row} = settle({start}, {push}, w, age, C, S, L, now)\n"
+    elif isinstance(method, Rosenbrock):
+        return _led(slices, begin, row)
+    else:
+        body = f"        {row} = settle({', '.join(known)}, {push}, g, age, C, S, L, now)\n"
+    return f"@kernel\ndef settled{head}{slices}{lines}{begin}{body}"
+
+
+def _led(slices: str, begin: str, row: str) -> str:
+    """Source of `led`: the u of (1 / (gamma h) - J) u = base, with J of a row's own forces at Y."""
+    body = f"        shifted({row}, M, pivots, h, age, C, S, L, now)\n"
+    body += "".join(f"        r[{k}] = p{n}[i]\n" for k, n in enumerate(STATE))
+    body += "".join(f"        r[{k}] += g{a}[i]\n" for k, a in enumerate(AXES, 3))
+    body += "        substitute(M, pivots, r)\n"
+    body += "        for j in range(6):\n            way[j, lo + i] = r[j]\n"
+    room = "    h, M, pivots, r = F(dt), empty(36, F), empty(6, F), empty(6, F)\n"
+    head = "@kernel\ndef led(Y, birth, columns, push, base, way, K, t, dt, lo, hi):\n"
+    return head + slices + room + begin + body
 
 
 def write_threats(text: Text, surfaces: Surfaces) -> None:

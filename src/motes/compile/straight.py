@@ -6,7 +6,8 @@ With solids, a row whose path might meet one is held: it is left as it was and l
 
 from __future__ import annotations
 
-from motes.compile.motion import Motion, stage_times, write_potential
+from motes.compile.advance import stage_times
+from motes.compile.motion import Motion, write_potential
 from motes.compile.surfaces import Surfaces
 from motes.compile.text import AXES, STATE, Text
 from motes.compile.threat import END
@@ -26,7 +27,7 @@ def write_straight(text: Text, motion: Motion, surfaces: Surfaces | None) -> Non
         _write_retire(text, loop)
 
 
-HEAD = "(position, velocity, birth, columns, flags, held, K, t, end, lo, hi):\n"
+HEAD = "(position, velocity, birth, columns, past, flags, held, K, t, end, lo, hi):\n"
 
 CHUNK = 2048
 """Rows whose ages are found at once: a double in the main loop would halve its SIMD width."""
@@ -51,15 +52,17 @@ class _Loop:
     """What every loop over rows says."""
 
     def __init__(self, text: Text, motion: Motion) -> None:
+        self.past = [f"p{k}" for k in range(motion.remembers)]
         self.names = [f"c{i}" for i in range(sum(c.width for c in text.values.columns))]
         self.state = STATE if motion.inertial else AXES
         self.row = ", ".join(f"{n}[i]" if n in self.state else "F(0.0)" for n in STATE)
         self.columns = f"({''.join(f'{n}[i], ' for n in self.names) or 'F(0.0),'})"
 
-    def slices(self, low: str, high: str, indent: str) -> str:
+    def slices(self, low: str, high: str, indent: str, past: bool = False) -> str:
         """Source that cuts the columns to a range of rows."""
         parts = [(n, _block(n)) for n in self.state]
         parts += [(n, f"columns[{i}]") for i, n in enumerate(self.names)]
+        parts += [(n, f"past[{i}]") for i, n in enumerate(self.past) if past]
         parts.append(("born", "birth"))
         return "".join(f"{indent}{n} = {array}[{low}:{high}]\n" for n, array in parts)
 
@@ -88,8 +91,14 @@ def _write_step(
         body = f"            age = {'ages[i]' if aged else 'F(0.0)'}\n"
         scene, after = ", ".join(f"S{i}" for i in stages), "S"
     times, ends = ", ".join(f"t{i}" for i in stages), ", ".join(END)
-    call = f"{loop.row}, age, C, {scene}, L, {times}, h"
-    body += f"            C = {loop.columns}\n            {ends} = advance({call})\n"
+    before = "".join(f"{n}[i], " for n in loop.past) if not young else ""
+    call = f"{loop.row}, {before}age, C, {scene}, L, {times}, h"
+    step = "proceed" if before else "advance"
+    body += f"            C = {loop.columns}\n            {ends} = {step}({call})\n"
+    if before:  # A row that is held forgets its past in the exceptions pass.
+        for k, n in enumerate(STATE):
+            body += f"            p{k}[i] = {f'n{n} - {n}[i]' if n in loop.state else 'F(0.0)'}\n"
+        body += "            p6[i] = F(1.0) / h\n"
     marks = []
     if surfaces is not None:
         prelude += "    D0, D1 = solids(scene(K, t)), solids(scene(K, end))\n"
@@ -126,7 +135,7 @@ def _write_step(
         f"@kernel\ndef {'young' if young else 'straight'}{HEAD}{prelude}"
         f"    for low in range(lo, hi, {CHUNK}):\n"
         f"        high = min(low + {CHUNK}, hi)\n"
-        f"{loop.slices('low', 'high', ' ' * 8)}        flag = flags[low:high]\n"
+        f"{loop.slices('low', 'high', ' ' * 8, past=not young)}        flag = flags[low:high]\n"
         f"{found}        for i in range(x.size):\n{body}{listing}"
     )
 

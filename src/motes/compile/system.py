@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.catalog import Component
+from motes.compile.advance import write_motion
 from motes.compile.births import Channels, births_kernel, write_draws, write_emitter
 from motes.compile.impacts import (
     currents_kernel,
@@ -22,7 +23,7 @@ from motes.compile.impacts import (
     rebounds_kernel,
     write_flight,
 )
-from motes.compile.motion import KEPT, Motion, write_motion
+from motes.compile.motion import KEPT, Motion
 from motes.compile.staged import write_staged, write_threats
 from motes.compile.straight import write_potentials, write_straight
 from motes.compile.surfaces import Surfaces, write_surfaces

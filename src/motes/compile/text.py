@@ -25,6 +25,7 @@ from motes.generated import executed
 from motes.jit import FAST, STRICT, jit
 from motes.kernel import ELEMENTARY
 from motes.kernel.language import Translation, can_fold
+from motes.linear import factorise, implicit_matrix, substitute
 
 AXES = ("x", "y", "z")
 STATE = ("x", "y", "z", "vx", "vy", "vz")
@@ -111,6 +112,9 @@ class Text:
             "bits": np.int32 if self.precision == "single" else np.int64,
             "SIGN": np.int32(31) if self.precision == "single" else np.int64(63),
             "empty": np.empty,
+            "implicit_matrix": implicit_matrix,
+            "factorise": factorise,
+            "substitute": substitute,
             "inline": lambda f: jit(f, flags=flags, inline=True),
             "kernel": lambda f: jit(f, flags=flags, numba=False),
             "lookup": _lookup(self.real, flags),

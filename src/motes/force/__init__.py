@@ -12,7 +12,14 @@ of the scene: `q.obstacle` is the gap to the nearest one [m] and its normal, (ga
 
 from __future__ import annotations
 
-from motes.catalog import Kind, attribute
+from motes.catalog import Flag, Kind, attribute, quantity
 
-KIND = Kind("force", "force", "particle", ("acceleration", "relaxation", "limited"))
+
+class _Common:
+    stiff: Flag = quantity(False)
+    """Whether integrators in two parts (kencarp3, kencarp4) take it implicitly, and forces without
+    this mark explicitly. Where no force has the mark they take all implicitly."""
+
+
+KIND = Kind("force", "force", "particle", ("acceleration", "relaxation", "limited"), _Common)
 __getattr__ = attribute("force")

@@ -18,15 +18,17 @@ from motes.errors import SceneError
 from motes.group.capture import Captures
 from motes.group.constrain import Constraints, Ground
 from motes.group.contacts import Contacts, Planes
+from motes.group.implicit import backward_difference, one_by_one, together
 from motes.group.lasting import Body, Lasting
 from motes.group.members import Bodies, Member, Movers, Occasion
-from motes.group.methods import implicit_stages, runge_kutta, split
+from motes.group.methods import nystrom, runge_kutta, split
 from motes.group.nearby import Nearby
 from motes.group.partners import Interactions, having, kernel, named, partners, values
+from motes.group.rosenbrock import rosenbrock
 from motes.interact.arrange import Box
 from motes.state import Particles
 from motes.step import Interval, Stepper
-from motes.tableau import Implicit, Splitting
+from motes.tableau import BackwardDifference, Explicit, Nystrom, Rosenbrock, Splitting
 
 NOTHING: dict[Any, NDArray[Any]] = {
     real: np.zeros((3, 0), real) for real in (np.float32, np.float64)
@@ -67,6 +69,16 @@ class Group:
                 f'{who} by "{laws[0][1].name}", a law of velocities, which holds between kick and '
                 'drift: choose integrator = "semi_implicit_euler" or another splitting method.'
             )
+        if isinstance(self.method, Nystrom) and self.nearby.depends_on_velocity:
+            raise SceneError(
+                f"{who} by a law that depends on velocities, and nystrom5 is for forces that "
+                "follow from place and time alone. Choose rk4 or dopri5."
+            )
+        if isinstance(self.method, Rosenbrock) and any(motion.limits for motion in motions):
+            raise SceneError(
+                f"{who}, and a limit bounds the sum of all forces, which rodas4 takes apart. "
+                "Choose radau5 or kencarp4."
+            )
         if not all(motion.inertial for motion in motions):
             raise SceneError(f"{who} and must have velocities: give them a force besides flows.")
 
@@ -94,12 +106,7 @@ class Group:
         begin = partial(self._bodies, systems, alive, interval.begin)
         self.nearby.settle(kept, begin, memory)
         members = {name: self._member(name, systems[name], alive[name], memory) for name in alive}
-        if isinstance(self.method, Splitting):
-            split(self, members, interval, self.method, memory)
-        elif isinstance(self.method, Implicit):
-            implicit_stages(self, members, interval, self.method, memory)
-        else:
-            runge_kutta(self, members, interval, self.method, memory)
+        self._integrate(members, interval, memory)
         for name, stepper in self.steppers.items():
             if stepper.system.surfaces is not None:
                 if stepper.rebounds(systems[name], members[name].y, alive[name], interval):
@@ -118,6 +125,22 @@ class Group:
             caught = self.captures.rows(name)
             if caught.size or stepper.system.motion.mortal:
                 stepper.deaths(rows, np.arange(rows.count), interval, caught)
+
+    def _integrate(self, members: dict[str, Member], interval: Interval, memory: Lasting) -> None:
+        """Take the states of all members from the step's begin to its end."""
+        method = self.method
+        if isinstance(method, Splitting):
+            split(self, members, interval, method, memory)
+        elif isinstance(method, Explicit):
+            runge_kutta(self, members, interval, method, memory)
+        elif isinstance(method, Nystrom):
+            nystrom(self, members, interval, method, memory)
+        elif isinstance(method, BackwardDifference):
+            backward_difference(self, members, interval, method, memory)
+        elif isinstance(method, Rosenbrock):
+            rosenbrock(self, members, interval, method, memory)
+        else:
+            (one_by_one if method.diagonal else together)(self, members, interval, method, memory)
 
     def _bodies(
         self, systems: dict[str, Particles], alive: dict[str, int], time: float
@@ -198,6 +221,8 @@ class Group:
         when = Occasion(interval.length, memory.steps, address, seed, self._periodic, planes)
         if kernel(part, "exchange")(p, movers, when):
             memory.push = None
+            for name in chosen:
+                members[name].rows.forget(slice(0, members[name].alive))
 
     def energy(self, systems: dict[str, Particles], time: float) -> float:
         """Potential energy [J] of the interactions that define one."""

@@ -6,7 +6,6 @@ wherever something moves.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -14,21 +13,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.compile import implicit
 from motes.compile.staged import combine
-from motes.errors import SimulationError
 from motes.group.lasting import Lasting
 from motes.group.members import Member
 from motes.group.partners import partners, values
 from motes.jit import even_blocks, share
 from motes.step import Interval
-from motes.tableau import Explicit, Implicit, Splitting
+from motes.tableau import Explicit, Nystrom, Splitting
 
 if TYPE_CHECKING:
     from motes.group.group import Group
-
-ROUNDED = 1e3
-"""Roundings that an implicit stage of a group may still be off where its iteration ended."""
 
 
 def split(
@@ -40,7 +34,7 @@ def split(
         name: m.y[3:, : m.alive].copy() for name, m in members.items() if group.constraints.laws
     }
     for kick, drift, place in _turns(method):
-        time = _at(interval, place)
+        time = at(interval, place)
         if kick:
             group.interact(members, time, memory)
             for member in members.values():
@@ -66,66 +60,50 @@ def runge_kutta(
     bases = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
     slopes = {name: np.zeros((s, 6, m.alive), m.y.dtype) for name, m in members.items()}
     for i, row in enumerate((*method.a, method.b)):
-        _combine(members, bases, slopes, row, h)
+        combined(members, bases, slopes, row, h)
         memory.push = None
         if i == s:
             return
-        time = _at(interval, method.c[i])
+        time = at(interval, method.c[i])
         group.interact(members, time, memory)
         for name, member in members.items():
             member.each("slope", slopes[name][i], member.K, numbers=(time,))
 
 
-def implicit_stages(
-    group: Group, members: dict[str, Member], interval: Interval, method: Implicit, memory: Lasting
+def nystrom(
+    group: Group, members: dict[str, Member], interval: Interval, method: Nystrom, memory: Lasting
 ) -> None:
-    """Stages one by one; each row's own forces by Newton's method, pushes by iteration.
-
-    That converges where h^2 times the stiffness between particles stays below 1; forces of
-    one particle alone, and damping, may be as stiff as they like.
-    """
-    h = interval.length
+    """Stages of a Nystrom table; what acts follows from place and time alone."""
+    h, s = interval.length, method.stages
     bases = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
-    places = implicit.stages(method)
-    slopes = {n: np.zeros((len(places), 6, m.alive), m.y.dtype) for n, m in members.items()}
-    for place, i in enumerate(places):
-        _combine(members, bases, slopes, [method.a[i][j] for j in places[:place]], h)
-        memory.push = None
-        time, g = _at(interval, method.c[i]), method.a[i][i] * h
-        if not g:
-            group.interact(members, time, memory)
-            for name, member in members.items():
-                member.each("slope", slopes[name][place], member.K, numbers=(time,))
-            continue
-        known = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
-        last = math.inf
-        for _ in range(implicit.ITERATIONS):
-            before = {name: m.y[:, : m.alive].copy() for name, m in members.items()}
-            group.interact(members, time, memory)
-            memory.push = None
-            for name, member in members.items():
-                member.each("settled", known[name], member.K, numbers=(time, g))
-            change = max(_change(m.y[:, : m.alive], before[name]) for name, m in members.items())
-            if change <= 1 or not change < last:
-                break
-            last = change
-        if not change <= ROUNDED:
-            raise SimulationError(
-                f"the equations of a step at t = {interval.begin:.6g} s have no solution: the "
-                f"interaction is too stiff for its length, {h:g} s. Try a smaller step."
-            )
+    slopes = {name: np.zeros((s, 6, m.alive), m.y.dtype) for name, m in members.items()}
+
+    def placed(c: float, row: Sequence[float]) -> None:
         for name, m in members.items():
-            slopes[name][place] = (m.y[:, : m.alive] - known[name]) / m.y.dtype.type(g)
-    _combine(members, bases, slopes, [method.b[i] for i in places], h)
-    memory.push = None
+            weights = np.array([h * h * w for w in row], m.y.dtype)
+            far = np.tensordot(weights, slopes[name][: len(row), 3:], 1)
+            m.y[:3, : m.alive] = bases[name][:3] + m.y.dtype.type(c * h) * bases[name][3:] + far
+        memory.push = None
+
+    for i, row in enumerate(method.a):
+        placed(method.c[i], row)
+        time = at(interval, method.c[i])
+        group.interact(members, time, memory)
+        for name, member in members.items():
+            member.each("slope", slopes[name][i], member.K, numbers=(time,))
+    placed(1.0, method.b_position)
+    positions = {name: m.y[:3, : m.alive].copy() for name, m in members.items()}
+    combined(members, bases, slopes, method.b, h)
+    for name, m in members.items():
+        m.y[:3, : m.alive] = positions[name]
 
 
-def _at(interval: Interval, share: float) -> float:
+def at(interval: Interval, share: float) -> float:
     """A time within a step; its end is the next one's begin, to the last bit."""
     return interval.end if share == 1.0 else interval.begin + share * interval.length
 
 
-def _combine(
+def combined(
     members: dict[str, Member],
     bases: dict[str, NDArray[Any]],
     slopes: dict[str, NDArray[Any]],
@@ -138,14 +116,3 @@ def _combine(
         row = np.array(weights, float).astype(real)
         arguments = (bases[name], slopes[name], row, real(h), member.y)
         share(lambda k, a=arguments, p=parts: combine(*a, *p[k]), len(parts))  # type: ignore[misc]
-
-
-def _change(state: NDArray[Any], before: NDArray[Any]) -> float:
-    """Largest change of positions and of velocities, in roundings of their largest number."""
-    result = 0.0
-    for block, old in ((state[:3], before[:3]), (state[3:], before[3:])):
-        size = float(np.abs(block).max(initial=0.0)) * float(np.finfo(state.dtype).eps)
-        moved = float(np.abs(block - old).max(initial=0.0))
-        if moved:
-            result = max(result, moved / size)
-    return result if np.isfinite(state).all() else math.inf

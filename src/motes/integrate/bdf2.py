@@ -1,7 +1,8 @@
 """The second backward differentiation formula: stiff problems with one solve a step.
 
-Hairer and Wanner, Solving Ordinary Differential Equations II, section V.1. Backward Euler
-makes the first step.
+Backward Euler makes the first step. In a scene sdirk2 takes particles through steps in which they
+are born or bounce, and backward Euler makes the first one after. Hairer and Wanner, Solving
+Ordinary Differential Equations II, section V.1.
 """
 
 from motes.tableau import BackwardDifference

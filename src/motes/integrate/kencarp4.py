@@ -1,8 +1,9 @@
 """Kennedy and Carpenter's fourth-order method: stiff problems, whole or only a stiff part of them.
 
-L-stable. With `stiff=g`, y' = f + g: g is taken implicitly, f explicitly (an additive
-pair). C. A. Kennedy and M. H. Carpenter, Additive Runge-Kutta schemes for convection-diffusion-
-reaction equations, Applied Numerical Mathematics 44 (2003) 139-181, ARK4(3)6L[2]SA.
+L-stable. With `stiff=g`, y' = f + g: g is taken implicitly, f explicitly (an additive pair); in a
+scene, forces with `stiff = true` are g. C. A. Kennedy and M. H. Carpenter, Additive Runge-Kutta
+schemes for convection-diffusion-reaction equations, Applied Numerical Mathematics 44 (2003)
+139-181, ARK4(3)6L[2]SA.
 """
 
 from motes.tableau import Implicit

@@ -1,5 +1,7 @@
 """Nystrom's fifth-order method for x'' = a(t, x): four evaluations a step.
 
+For forces that follow from place and time alone: scenes with drag, wind or flows refuse it.
+
 E. J. Nystrom, 1925; Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, table
 II.14.2.
 """

@@ -1,7 +1,9 @@
 """The Rosenbrock method RODAS: fourth order, stiff problems without any iteration.
 
-L-stable, with an embedded method of order 3. Coefficients: Hairer and Wanner, Solving Ordinary
-Differential Equations II, section IV.7, and their program rodas.f (METH = 1).
+With fixed steps, as in a scene, stiff forces must be nearly linear (drag, a spring); where stiff
+ones bend, as in a net of springs, radau5 and kencarp4 hold. L-stable, with an embedded method of
+order 3. Coefficients: Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.7,
+and their program rodas.f (METH = 1).
 """
 
 from motes.tableau import Rosenbrock

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from motes.interact.cells import Grid, first_from, grid
 from motes.jit import STRICT, jit
-from motes.machine.lanes import bits, count, pack, take
+from motes.machine.lanes import put_some, take
 
 ALONG = 4
 """Cells along x for each reach."""
@@ -165,7 +165,7 @@ def chooser(lanes: int) -> Any:
         dx, dy, dz = shift[r, 0], shift[r, 1], shift[r, 2]
         west, south, floor = low[0] - dx, low[1] - dy, low[2] - dz
         east, north, roof = high[0] - dx, high[1] - dy, high[2] - dz
-        held = np.uint64(0)
+        held = 0
         while r < number and shift[r, 0] == dx and shift[r, 1] == dy and shift[r, 2] == dz:
             at, last = run[r, 0], run[r, 1]
             while at < last:
@@ -175,10 +175,9 @@ def chooser(lanes: int) -> Any:
                 gx = x - max(min(x, east), west)
                 gy = y - max(min(y, north), south)
                 gz = z - max(min(z, roof), floor)
-                marks = bits(gx * gx + gy * gy + gz * gz <= limit)
-                marks &= (np.uint64(1) << np.uint64(min(last - at, lanes))) - np.uint64(1)
-                pack(pick, held, take(ramp, at, lanes), marks)
-                held += count(marks)
+                who = take(ramp, at, lanes)
+                near = (gx * gx + gy * gy + gz * gz <= limit) & (who < np.int32(last))
+                held += put_some(pick, held, who, near)
                 at += lanes
             r += 1
         return r, held

@@ -23,10 +23,29 @@ from motes.machine.kinds import (
     Unsupported,
     of_dtype,
 )
-from motes.machine.lanes import bits, count, lowest, pack, put, settled, take
-from motes.machine.memory import Memory
-from motes.machine.shuffles import SEEKING_NEEDS, near_slots, seeking, taken_apart, taking
-from motes.machine.values import Group, Known, Scalar, Value, View, type_of
+from motes.machine.lanes import (
+    bits,
+    choose,
+    largest,
+    lowest,
+    put,
+    put_some,
+    rough_inverse_root,
+    settled,
+    spread_over,
+    take,
+    total,
+)
+from motes.machine.many import Many
+from motes.machine.shuffles import (
+    SEEKING_NEEDS,
+    near_slots,
+    order_table,
+    seeking,
+    taken_apart,
+    taking,
+)
+from motes.machine.values import Group, Known, Scalar, Value, View, Written, type_of
 
 ROOM = 1 << 14
 """Elements of an array that is kept on the stack; larger ones, or of a size that is not known while
@@ -39,7 +58,7 @@ def plain_function(thing: Any) -> types.FunctionType | None:
     return function if isinstance(function, types.FunctionType) else None
 
 
-class Calls(Memory):
+class Calls(Many):
     """Calls by what is called."""
 
     def constant(self, thing: Any) -> Value:
@@ -90,6 +109,8 @@ class Calls(Memory):
             return Group(tuple(arguments), thing._fields)
         if isinstance(thing, np.ufunc | types.BuiltinFunctionType) and thing in FORMULAS:
             return self.formula(FORMULAS[thing], arguments)
+        if isinstance(thing, Written):
+            return thing.write(self, arguments)
         function = plain_function(thing)
         if function is None:
             raise Unsupported(f"{getattr(thing, '__name__', thing)!r} cannot be called in a kernel")
@@ -222,10 +243,6 @@ class Calls(Memory):
         whole = self.cast(self._number(number), UINT).text
         return Scalar(UINT, self.do(f"call i64 @llvm.cttz.i64(i64 {whole}, i1 true)"))
 
-    def count(self, marks: Value) -> Value:
-        """`lanes.count`."""
-        return self.intrinsic("ctpop", self.cast(self._number(marks), UINT))
-
     def empty(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
         """numpy.empty: room that the call has for itself; its numbers are not set."""
         item = of_dtype(np.dtype(_thing(kind)))
@@ -304,6 +321,7 @@ class Calls(Memory):
         me = self.cast(self._number(given[4]), INT32).text
         for declaration in SEEKING_NEEDS:
             self.declare(declaration)
+        order_table(self)
         name = f"near_slots.{item.llvm}"
         self.written(name, seeking(item.llvm))
         passed = [f"{item.llvm} {number}" for number in numbers]
@@ -358,9 +376,13 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     take: Calls.take,
     put: Calls.put,
     bits: Calls.bits,
-    count: Calls.count,
-    pack: Calls.pack,
     lowest: Calls.lowest,
+    choose: Calls.choose,
+    total: Calls.total,
+    largest: Calls.largest_lane,
+    rough_inverse_root: Calls.rough_inverse_root,
+    put_some: Calls.put_some,
+    spread_over: Calls.spread_over,
     settled: _intrinsic("arithmetic.fence"),
     math.fabs: _intrinsic("fabs"),
     taken_apart: Calls.taken_apart,

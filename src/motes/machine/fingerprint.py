@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from motes.machine.values import Written
+
 
 def fingerprint(function: Callable[..., Any], seen: frozenset[int] = frozenset()) -> str:
     """Hash of a function's code and of all functions and constants that it reaches."""
@@ -48,8 +50,8 @@ def _describe(value: Any, names: tuple[str, ...], seen: frozenset[int]) -> str:
         return fingerprint(value.py_func, seen) + repr(sorted(getattr(value, "flags", ())))
     if isinstance(value, types.FunctionType):
         return fingerprint(value, seen)
-    if isinstance(written := getattr(value, "_defn", None), types.FunctionType):
-        return fingerprint(written, seen)  # What writes one of Numba's intrinsics.
+    if isinstance(value, Written):
+        return fingerprint(value.formula, seen)
     if isinstance(value, np.ndarray):
         return hashlib.sha256(value.tobytes()).hexdigest() + str(value.dtype)
     if isinstance(value, types.ModuleType):

@@ -2,7 +2,7 @@
 
 A kernel that is written for one number works on lanes as it stands: an operation on lanes and a
 single number takes that number for every lane, and a choice picks lane by lane. Where plain Python
-runs a kernel, there is one lane.
+runs a kernel, one lane is a number, and several are an array.
 """
 
 from __future__ import annotations
@@ -14,19 +14,25 @@ import numpy as np
 
 def take(array: Any, place: Any, lanes: int) -> Any:
     """Elements of an array of one axis, from `place` on, one for each of `lanes` (a literal)."""
-    if lanes != 1:
-        raise ValueError(f"plain Python has one lane, not {lanes}")
-    return array[place]
+    return array[place] if lanes == 1 else array[place : place + lanes].copy()
 
 
 def put(array: Any, place: Any, value: Any) -> None:
     """Write what `take` could have given, or one number, to an array from `place` on."""
-    array[place] = value
+    if np.ndim(value):
+        array[place : place + len(value)] = value
+    else:
+        array[place] = value
+
+
+def spread_over(value: Any, lanes: int) -> Any:
+    """A number in every one of `lanes` (a literal)."""
+    return value if lanes == 1 else np.full(lanes, value)
 
 
 def bits(condition: Any) -> Any:
     """A condition's lanes as the bits of an unsigned integer, the first lane the lowest."""
-    return np.uint64(bool(condition))
+    return np.uint64(sum(1 << k for k, true in enumerate(np.ravel(condition)) if true))
 
 
 def lowest(number: Any) -> Any:
@@ -40,14 +46,32 @@ def settled(value: Any) -> Any:
     return value
 
 
-def count(marks: Any) -> Any:
-    """How many bits of an unsigned integer are set."""
-    return np.uint64(int(marks).bit_count())
+def choose(condition: Any, one: Any, other: Any) -> Any:
+    """`one` where a condition holds, `other` where not, lane by lane."""
+    return np.where(condition, one, other)
 
 
-def pack(array: Any, place: Any, value: Any, marks: Any) -> None:
-    """Write the lanes of a value whose bits in `marks` are set one after another, from `place` on.
+def total(lanes: Any) -> Any:
+    """Sum over the lanes, by halves."""
+    return lanes.sum()
 
-    As many elements as there are lanes may change.
+
+def largest(lanes: Any) -> Any:
+    """Largest lane."""
+    return lanes.max()
+
+
+def rough_inverse_root(value: Any) -> Any:
+    """1 / root in single precision, to 11 bits or better."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.float32(1) / np.sqrt(value)
+
+
+def put_some(array: Any, place: Any, value: Any, condition: Any) -> int:
+    """Write the lanes where a condition holds to an array, one after another.
+
+    Returns how many there are; as many numbers as there are lanes may change, from `place` on.
     """
-    array[place] = value
+    some = np.atleast_1d(value)[np.atleast_1d(condition)]
+    array[place : place + len(some)] = some
+    return len(some)

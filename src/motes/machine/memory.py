@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from motes.machine.arithmetic import Arithmetic
 from motes.machine.block import common_type
 from motes.machine.kinds import INT, UINT, Array, LiteralNeeded, Number, Unsupported
-from motes.machine.shuffles import ORDERS, PERMUTE
 from motes.machine.values import Group, Known, Scalar, Value, View
 
 
@@ -83,34 +82,6 @@ class Memory(Arithmetic):
         number = self.cast(value, one)
         text = f"{number.type.llvm} {number.text}, ptr {address}, align {one.bytes}"
         self.line(f"store {text}{self.kind_of_memory(one)}")
-        return Known(None)
-
-    def pack(self, array: View, place: Scalar, value: Scalar, marks: Scalar) -> Value:
-        """Write some lanes to the elements of an array one after another, from a place on."""
-        from motes.machine.target import moves_lanes
-
-        one, address = array.type.item, self._start(array, place)
-        number, chosen = self.cast(value, one), self.cast(marks, UINT).text
-        kind, lanes, memory = number.type, number.type.lanes, self.kind_of_memory(one)
-        if lanes == 1:
-            self.line(f"store {one.llvm} {number.text}, ptr {address}{memory}")
-        elif moves_lanes() and kind.llvm == "<8 x i32>":
-            self.declare(ORDERS)
-            self.declare(PERMUTE)
-            row = self.do(f"getelementptr inbounds <8 x i32>, ptr @orders, i64 {chosen}")
-            order = self.do(f"load <8 x i32>, ptr {row}, align 32")
-            given = f"<8 x i32> {number.text}, <8 x i32> {order}"
-            packed = self.do(f"call <8 x i32> @llvm.x86.avx2.permd({given})")
-            self.line(f"store {kind.llvm} {packed}, ptr {address}, align {one.bytes}{memory}")
-        else:
-            at = "0"
-            for k in range(lanes):
-                to = self.do(f"getelementptr inbounds {one.llvm}, ptr {address}, i64 {at}")
-                item = self.do(f"extractelement {kind.llvm} {number.text}, i64 {k}")
-                self.line(f"store {one.llvm} {item}, ptr {to}{memory}")
-                mark = self.do(f"lshr i64 {chosen}, {k}")
-                mark = self.do(f"and i64 {mark}, 1")
-                at = self.do(f"add nsw i64 {at}, {mark}")
         return Known(None)
 
     def _start(self, array: View, place: Scalar) -> str:

@@ -135,7 +135,7 @@ def seeking(real: str) -> str:
     chosen_ = text.do(f"and <8 x i1> {inside}, {others}")
     bits = text.do(f"bitcast <8 x i1> {chosen_} to i8")
     place = text.do(f"zext i8 {bits} to i64")
-    at = text.do(f"getelementptr inbounds <8 x i32>, ptr @orders, i64 {place}")
+    at = text.do(f"getelementptr inbounds <8 x i32>, ptr {ORDERS}, i64 {place}")
     order = text.do(f"load <8 x i32>, ptr {at}, align 32")
     kept = text.do(f"call <8 x i32> @llvm.x86.avx2.permd(<8 x i32> {slot}, <8 x i32> {order})")
     at = text.do("getelementptr inbounds i32, ptr %out, i64 %new")
@@ -146,25 +146,25 @@ def seeking(real: str) -> str:
     return text.whole("ret i64 %new")
 
 
-def _orders() -> str:
-    rows = []
-    for marks in range(1 << LANES):
-        chosen = [k for k in range(LANES) if marks >> k & 1]
-        rows.append(f"<8 x i32> <{', '.join(f'i32 {k}' for k in (chosen + [0] * LANES)[:LANES])}>")
-    return f"@orders = internal constant [{len(rows)} x <8 x i32>] [{', '.join(rows)}], align 32"
-
-
-ORDERS = _orders()
-"""A table: for all marks of eight lanes, which lanes are marked."""
-
-PERMUTE = "declare <8 x i32> @llvm.x86.avx2.permd(<8 x i32>, <8 x i32>)"
-
 SEEKING_NEEDS = (
-    ORDERS,
-    PERMUTE,
+    "declare <8 x i32> @llvm.x86.avx2.permd(<8 x i32>, <8 x i32>)",
     "declare i8 @llvm.ctpop.i8(i8)",
 )
 """What `seeking` calls."""
+
+
+ORDERS = "@orders"
+
+
+def order_table(writer: Any) -> str:
+    """Name of a table: for each set of eight lanes, the order that begins with those of the set."""
+    rows = []
+    for mark in range(256):
+        chosen = [k for k in range(LANES) if mark >> k & 1]
+        rows.append(f"<8 x i32> <{', '.join(f'i32 {k}' for k in (chosen + [0] * LANES)[:LANES])}>")
+    content = ", ".join(rows)
+    writer.declare(f"{ORDERS} = internal constant [256 x <8 x i32>] [{content}], align 32")
+    return ORDERS
 
 
 class _Text:

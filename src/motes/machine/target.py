@@ -22,12 +22,28 @@ def processor() -> tuple[str, str, str]:
     triple = binding.get_process_triple()
     if sys.platform == "win32":
         triple += "-elf"  # LLVM's loader knows that format best.
-    return triple, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    features = binding.get_host_cpu_features().flatten()
+    if "+avx512f" in features.split(","):
+        # LLVM prefers half of the registers on some processors, from the days when full ones
+        # lowered the clock.
+        features += ",-prefer-256-bit"
+    return triple, binding.get_host_cpu_name(), features
+
+
+@cache
+def has(feature: str) -> bool:
+    """Whether the processor has a feature, by LLVM's name."""
+    return f"+{feature}" in processor()[2].split(",")
 
 
 def moves_lanes() -> bool:
-    """Whether the processor permutes a vector's eight lanes by those of another (AVX2)."""
-    return "+avx2" in processor()[2].split(",")
+    """Whether the processor permutes a vector's eight lanes by those of another."""
+    return has("avx2")
+
+
+def widest() -> int:
+    """Numbers in single precision that one register holds, at least 8."""
+    return 16 if has("avx512f") else 8
 
 
 def identity() -> str:

@@ -7,7 +7,7 @@ modules, None) is a `Known`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,3 +106,14 @@ def of_registers(type: Type, names: Sequence[str] | Iterator[str]) -> Value:
         strides = () if type.packed else tuple(next(source) for _ in range(type.axes))
         return View(type, address, shape, strides)
     return Known(None)
+
+
+class Written:
+    """Something that kernels call and that writes its own code."""
+
+    formula: Callable[..., Any]
+    """What the code follows from."""
+
+    def write(self, writer: Any, values: Sequence[Value]) -> Value:
+        """Write the code of a call with given arguments; returns what it gives."""
+        raise NotImplementedError

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from motes.ode import linear
+from motes import linear
 from motes.ode.arithmetic import Kernel, add, copy, norm
 from motes.ode.backward_difference import backward_difference
 from motes.ode.implicit_frame import EXACTLY, Frame, ends, frame, weigh

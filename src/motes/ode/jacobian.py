@@ -10,10 +10,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from motes import linear
 from motes.jit import jit
-from motes.ode import linear
+from motes.linear import KRYLOV
 from motes.ode.arithmetic import Array, Kernel, add, copy
-from motes.ode.linear import KRYLOV
 from motes.ode.march import FIRST_SLOPE
 from motes.ode.right_hand_side import PLAIN, Wrap
 

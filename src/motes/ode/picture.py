@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from motes.errors import MissingExtra
-from motes.integrate import table as find
+from motes.integrate import method as find
 from motes.jit import jit
 from motes.ode.arithmetic import Array
 from motes.ode.right_hand_side import FirstOrder
@@ -30,6 +30,12 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 
 MARKS = "osD^vP*"
 HALVINGS = 5
+SHAPE = 0.9
+"""Width of the pane of paths over its height."""
+
+FAR = 3.0
+"""Sizes of the exact path from which on a path is gone for good."""
+
 MOST = 1_000_000
 """Steps of the longest solve that is drawn."""
 
@@ -111,6 +117,7 @@ def draw(
 
 def _figure(name: str, of: Problem, chosen: tuple[str, ...], lengths: list[float]) -> Figure:
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     reference = run(of, "verner9", None, rtol=1e-13, atol=1e-14)
     exact = of.exact(reference.t) if of.exact else reference.y
@@ -118,9 +125,10 @@ def _figure(name: str, of: Problem, chosen: tuple[str, ...], lengths: list[float
     paint = {
         method: {"color": COLOURS[i % 7], "marker": MARKS[i % 7]} for i, method in enumerate(chosen)
     }
-    figure = Figure(figsize=(14, 8), layout="constrained")
+    room = ConstrainedLayoutEngine(w_pad=0.12, h_pad=0.1)
+    figure = Figure(figsize=(14, 8), layout=room)
     panes = figure.subplot_mosaic("PPEK;PPSW", width_ratios=[1, 1, 1.1, 1.1])
-    figure.suptitle(about(name), fontsize=15, wrap=True)
+    figure.suptitle(about(name), fontsize=16, wrap=True)
     _paths(panes["P"], of, exact, {m: r[0] for m, r in runs.items()}, paint)
     panes["P"].set_title(f"paths at step {lengths[0]:g}; grey: exact")
     errors = {m: [_error(r, exact[-1]) for r in rs] for m, rs in runs.items()}
@@ -128,6 +136,11 @@ def _figure(name: str, of: Problem, chosen: tuple[str, ...], lengths: list[float
     _kept(panes["K"], of, reference.t, exact, {m: r[0] for m, r in runs.items()}, paint)
     _region(panes["S"], of, chosen[0], lengths[0], exact)
     _effort(panes["W"], runs, errors, paint)
+    lines, names = panes["E"].get_legend_handles_labels()
+    figure.legend(
+        lines, names, loc="outside lower center", ncols=min(len(names), 6), frameon=False,
+        fontsize=12, columnspacing=2.0,
+    )  # fmt: skip
     return figure
 
 
@@ -141,25 +154,37 @@ def _paths(axes: Axes, of: Problem, exact: Array, runs: dict[str, Run], paint: A
     margin = 0.3 * (high - low)
     if of.labels[0] == "t":
         margin[0] /= 10
-    elif of.labels == ("x", "y"):
+    elif of.labels == ("x", "y"):  # One scale along both: a circle is round and fills the pane.
+        width, height = high - low + 2 * margin.max()
         margin[:] = margin.max()
+        margin[0] += max(height * SHAPE - width, 0) / 2
+        margin[1] += max(width / SHAPE - height, 0) / 2
     axes.set_xlim(low[0] - margin[0], high[0] + margin[0])
     axes.set_ylim(low[1] - margin[1], high[1] + margin[1])
     if len(of.start) == 2:
         _field(axes, of)
     for i, j in of.axes:
         axes.plot(exact[:, i], exact[:, j], color="0.6", lw=4, zorder=1, solid_capstyle="round")
-    for method, one in runs.items():
-        for number, (i, j) in enumerate(of.axes):
-            axes.plot(
-                one.y[:, i], one.y[:, j], lw=1, ms=3.5, markevery=max(1, len(one.y) // 60),
-                label=method if number == 0 else None, **paint[method],
+    marked = 40 if len(of.axes) == 1 else 14
+    for number, (method, one) in enumerate(runs.items()):
+        every = max(1, len(one.y) // marked)
+        for i, j in of.axes:
+            x, y = _while_near(one.y[:, [i, j]], low, high).T
+            axes.plot(  # Marks of different methods take turns, so that none hides another.
+                x, y, lw=1.3, ms=4.5, alpha=0.9,
+                markevery=(number * every // len(runs), every), **paint[method],
             )  # fmt: skip
     if of.labels == ("x", "y"):
         axes.set_aspect("equal")
     axes.set_xlabel(of.labels[0])
     axes.set_ylabel(of.labels[1])
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.09), ncols=3, frameon=False)
+
+
+def _while_near(path: Array, low: Array, high: Array) -> Array:
+    """A path up to where it is gone for good: far outside the frame."""
+    far = np.abs(path - (low + high) / 2) > FAR * (high - low)
+    gone = np.flatnonzero(far.any(-1))
+    return path[: gone[0] + 1] if gone.size else path
 
 
 def _field(axes: Axes, of: Problem) -> None:
@@ -178,26 +203,32 @@ def _field(axes: Axes, of: Problem) -> None:
 
 
 def _errors(axes: Axes, lengths: list[float], errors: dict[str, list[float]], paint: Any) -> None:
+    least = min((e for values in errors.values() for e in values if e > 0), default=0.0)
+    rounding = least if least < 1e-9 else 0.0
     for method, values in errors.items():
         error = np.array(values)
         good = np.isfinite(error) & (error > 1e-13) & (error < 1e3)
-        log_h, log_e = np.log(np.array(lengths)[good]), np.log(error[good])
-        # The shortest two steps between which it still falls: the order shows where the error is
-        # small, but not yet rounding.
+        # The order shows where the error is small, but well above rounding.
+        clear = good & (error > 100 * rounding)
+        log_h, log_e = np.log(np.array(lengths)[clear]), np.log(error[clear])
         ratios = np.diff(log_e) / np.diff(log_h)
-        falling = ratios[ratios > 0.5]
-        slope = f": {falling[-1]:.1f}" if falling.size else ": far off"
+        falling = ratios[ratios > 0.5][-3:]
+        slope = "far off"
+        if falling.size:  # Where errors change their sign the last alone says little.
+            usual, last = float(np.median(falling)), float(falling[-1])
+            slope = f"slope {last if abs(last - usual) < 1 else usual:.1f}"
+        slope = "exact to rounding" if good.any() and not clear.any() else slope
         axes.loglog(
-            np.array(lengths)[good], error[good], ms=5, lw=1.2, **paint[method],
-            label=f"{method}{slope}",
+            np.array(lengths)[good], error[good], ms=6, lw=1.4, **paint[method],
+            label=f"{method}, {slope}",
         )  # fmt: skip
     axes.set_title("error at the end, and its slope")
-    axes.set_xticks(lengths, [f"{length:.2g}" for length in lengths])
+    texts = [f"{length:.2g}" for length in lengths]
+    if max(map(len, texts)) > 6:  # Long numbers need room.
+        texts[1::2] = [""] * len(texts[1::2])
+    axes.set_xticks(lengths, texts)
     axes.minorticks_off()
     axes.set_xlabel("step")
-    low, high = axes.get_ylim()
-    axes.set_ylim(low * (low / high) ** 0.55, high)  # Room for the legend below the lines.
-    axes.legend(fontsize=9, loc="lower right", ncols=2, columnspacing=1.0, handlelength=1.4)
     axes.grid(alpha=0.3)
 
 
@@ -230,19 +261,20 @@ def _region(axes: Axes, of: Problem, method: str, step: float, exact: Array) -> 
     places = exact[:: max(1, len(exact) // 20)]
     values = np.concatenate([step * np.linalg.eigvals(_jacobian(of, y)) for y in places])
     reach = max(4.0, min(1.3 * float(np.abs(values).max()), 30.0))
-    x, y = np.meshgrid(np.linspace(-reach, reach / 2, 151), np.linspace(-reach, reach, 201))
+    x, y = np.meshgrid(reach * np.arange(-160, 101) / 100, reach * np.arange(-100, 101) / 100)
     size = growth(find(method))(x + 1j * y)
     # A little more than 1, so that the axis on which splittings are stable can be seen.
     axes.contourf(x, y, size, levels=[0, 1.01], colors=["#cfe6f5"])
     axes.contour(x, y, size, levels=[1.01], colors=[COLOURS[0]], linewidths=1)
-    axes.plot(values.real, values.imag, "x", ms=5, color=COLOURS[1], label="step x eigenvalues")
+    axes.plot(values.real, values.imag, "x", ms=6, color=COLOURS[1])
     axes.axhline(0, color="0.7", lw=0.8)
     axes.axvline(0, color="0.7", lw=0.8)
     axes.set_title(f"{method}: stable where blue")
-    axes.set_xlabel("real part")
+    axes.set_xlabel("real part (\u00d7: $h \\lambda$ along the path)")
     axes.set_ylabel("imaginary part")
-    axes.set_aspect("equal", adjustable="box")
-    axes.legend(fontsize=9, loc="upper right", framealpha=0.95)
+    axes.set_xlim(-1.15 * reach, 0.85 * reach)
+    axes.set_ylim(-0.88 * reach, 0.88 * reach)  # The pane's shape, so that the frame stays.
+    axes.set_aspect("equal")
 
 
 def _jacobian(of: Problem, y: Array) -> Array:
@@ -259,12 +291,16 @@ def _jacobian(of: Problem, y: Array) -> Array:
 def _effort(
     axes: Axes, runs: dict[str, list[Run]], errors: dict[str, list[float]], paint: Any
 ) -> None:
+    from matplotlib.ticker import LogLocator, NullLocator
+
     for method, rs in runs.items():
         error = np.array(errors[method])
         good = np.isfinite(error) & (error > 1e-15) & (error < 1e3)
         evaluations = np.array([r.work.evaluations for r in rs])
-        axes.loglog(error[good], evaluations[good], ms=5, lw=1.2, **paint[method])
+        axes.loglog(error[good], evaluations[good], ms=6, lw=1.4, **paint[method])
     axes.invert_xaxis()
+    axes.xaxis.set_major_locator(LogLocator(numticks=5))
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.set_title("work and precision")
     axes.set_xlabel("error at the end")
     axes.set_ylabel("evaluations")

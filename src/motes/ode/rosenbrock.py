@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from motes.ode import linear
+from motes import linear
 from motes.ode.arithmetic import Kernel, add, copy, norm
 from motes.ode.implicit_frame import ends, frame, weigh
 from motes.ode.jacobian import (

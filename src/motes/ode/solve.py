@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from motes.integrate import method as find
 from motes.integrate import methods
-from motes.integrate import table as find
 from motes.ode import additive, explicit, implicit, right_hand_side
 from motes.ode.arithmetic import Array
 from motes.ode.implicit_frame import EXACTLY

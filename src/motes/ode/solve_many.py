@@ -12,7 +12,7 @@ import numpy as np
 from numba import TypingError
 from numpy.typing import ArrayLike, NDArray
 
-from motes.integrate import table as find
+from motes.integrate import method as find
 from motes.jit import blocks, share
 from motes.ode import lanes
 from motes.ode.arithmetic import Array, Kernel

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from motes.integrate import table as find
+from motes.integrate import method as find
 from motes.ode import newton, right_hand_side
 from motes.ode.march import Room
 from motes.ode.right_hand_side import FirstOrder, OfBoth

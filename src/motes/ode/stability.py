@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from motes import rooted_trees
 from motes.integrate import methods as tables
-from motes.tableau import BackwardDifference, Explicit, Implicit, Nystrom, Rosenbrock, Table
+from motes.tableau import (
+    BackwardDifference,
+    Explicit,
+    Implicit,
+    Nystrom,
+    Rosenbrock,
+    Splitting,
+    Table,
+)
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Real = NDArray[np.float64]
@@ -149,15 +157,32 @@ def _reach(table: Table, direction: complex) -> float:
 
 
 def error_constant(table: Table) -> float:
-    """Root of the sum of squared errors of the next order's conditions, for Runge-Kutta methods.
+    """Root of the sum of squared errors of the next order's conditions.
 
-    sqrt(sum over trees of p + 1 vertices of (b phi(t) - 1 / density(t))^2), unweighted.
+    sqrt(sum over trees of p + 1 vertices of (b phi(t) - 1 / density(t))^2), unweighted; for
+    second-order methods over the conditions of position and velocity; for a formula with a past,
+    sum a_j (-j)^(p + 1) / (p + 1)!, with the slope's weight 1. Hairer, Norsett and Wanner I,
+    sections II.2, II.14, III.2.
     """
-    if not isinstance(table, Explicit | Implicit):
-        return math.nan
-    weight = rooted_trees.weight(table.a)
-    defects = [
-        sum(x * y for x, y in zip(table.b, weight(t), strict=True)) - 1 / rooted_trees.density(t)
-        for t in rooted_trees.trees(table.order + 1)
-    ]
-    return math.sqrt(sum(defect**2 for defect in defects))
+    order = table.order
+    if isinstance(table, BackwardDifference):
+        terms = [a * (-j) ** (order + 1) for j, a in enumerate(table.a)]
+        return float(abs(sum(terms)) / math.factorial(order + 1))
+    trees = list(rooted_trees.trees(order + 1))
+    defects: list[float] = []
+    if isinstance(table, Nystrom | Splitting):
+        b_position, b_velocity = table.ends
+        for tree in filter(rooted_trees.special, trees):
+            defects.append(_defect(b_velocity, table.weight(tree), rooted_trees.density(tree)))
+        for tree in filter(rooted_trees.special, rooted_trees.trees(order)):
+            share = (order + 1) * rooted_trees.density(tree)
+            defects.append(_defect(b_position, table.weight(tree), share))
+        return math.hypot(*defects)
+    b = table.weights if isinstance(table, Rosenbrock) else table.b
+    weight = table.weight if isinstance(table, Rosenbrock) else rooted_trees.weight(table.a)
+    return math.hypot(*(_defect(b, weight(tree), rooted_trees.density(tree)) for tree in trees))
+
+
+def _defect(b: Sequence[float], phi: Sequence[float], density: float) -> float:
+    """sum b phi - 1 / density."""
+    return sum(x * y for x, y in zip(b, phi, strict=True)) - 1 / density

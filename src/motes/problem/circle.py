@@ -1,4 +1,4 @@
-"""The rotational field (-y, x): Euler spirals outward by sqrt(1 + h^2) each step, for any h."""
+"""The rotational field (-y, x): Euler spirals outward by √(1 + h²) each step, for any h."""
 
 import numpy as np
 

@@ -1,48 +1,72 @@
 """Which source cells are so far from a target cell that an expansion may stand for them."""
 
+# mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from types import FunctionType
 from typing import Any
 
-from motes.interact.gravity.traced import all_positive, gathered, ones, traced
+import numpy as np
+
+from motes.jit import EXACT, jit
+from motes.machine.lanes import choose
+from motes.machine.traced import gathered, traced
+
+LEAST = np.float32(0.1)
+"""Square of the smallest ratio of radii that makes a difference."""
+
+
+@traced
+def offsets(balls: Any, chosen: Any, own: Any) -> Any:
+    """x, y, z from the ball `own`, radius and mass of rows `chosen` of a table of balls."""
+    given = gathered(balls, chosen, 8)
+    x, y, z = (given[k] - own[k] + (given[3 + k] - own[3 + k]) for k in range(3))
+    return x, y, z, given[6], given[7]
+
+
+@traced
+def columns(cells: Any, chosen: Any) -> Any:
+    """START, END, FIRST and NUMBER of rows `chosen` of a table of cells."""
+    return tuple(gathered(cells, chosen, 4))
 
 
 @cache
-def acceptance(order: int) -> Callable[..., None]:
-    """Operation that tests LANES source cells together, for expansions of one order.
+def acceptance(order: int, low: int) -> Callable[..., Any]:
+    """Compiled function that tests LANES source cells together, for expansions of two orders.
 
-    (balls, chosen, own, stricter, opening2, reach, e2, verdict): row 0 of `verdict` becomes 1 where
-    the rows `chosen` of `balls` are far from the ball `own`, and 0 elsewhere. The error of the
-    acceleration is about M / R^2 q^p / (1 - q^2)^2 with q = (r_A + r_B) / R, the sum of the terms
-    that are left out; `stricter` is one over the error that is allowed. q^2 is below `opening2`,
-    the balls are more than `reach` apart, and e2 is added to R^2.
+    (balls, chosen, own, stricter, opening2, reach, e2) -> lanes: whether the rows `chosen` of
+    `balls` are far from the ball `own`, whether they are for the lower order, and their radii. The
+    error of the acceleration is about M / R^2 q^p / (1 - q^2) with q = (r_A + r_B) / R, the sum of
+    the terms that are left out. Cells smaller than the target come in crowds, and errors that the
+    target's radius makes are alike for a crowd: M then stands for M (r_A / r_B)^4, less where r_B
+    is tiny. `stricter` is one over the error that is allowed, for both orders. q^2 is below
+    `opening2`, the balls are more than `reach` apart, and e2 is added to R^2.
     """
 
-    @traced
+    @jit(inline=True, flags=EXACT)
     def is_far(
-        balls: Any, chosen: Any, own: Any, stricter: Any, opening2: Any, reach: Any, e2: Any,
-        verdict: Any,
-    ) -> None:  # fmt: skip
-        given = gathered(balls, chosen, 8)
-        x, y, z = (given[k] - own[k] + (given[3 + k] - own[3 + k]) for k in range(3))
+        balls: Any, chosen: Any, own: Any, stricter: Any, opening2: Any, reach: Any, e2: Any
+    ) -> Any:
+        x, y, z, radius, mass = offsets(balls, chosen, own)
         r2 = x * x + y * y + z * z + e2
-        radii = given[6] + own[6]
+        radii = radius + own[6]
         gap, square = radii + reach, radii * radii
-        inverse = ones(r2) / r2
-        q2, pull = square * inverse, given[7] * inverse * stricter
-        rest = ones(r2) - q2
-        rest2 = rest * rest
-        neglected = pull * pull * power(q2, order)
-        verdict[0] = all_positive(r2 - gap * gap, opening2 * r2 - square, rest2 * rest2 - neglected)
+        inverse = 1 / r2
+        q2 = square * inverse
+        rest = 1 - q2
+        own2 = own[6] * own[6]
+        smaller = own2 / (radius * radius + own2 * LEAST)
+        pull = mass * inverse * choose(smaller > 1, smaller * smaller, 1)
+        allowed = rest * rest
+        first, second = pull * stricter[0], pull * stricter[1]
+        apart = (r2 > gap * gap) & (square < opening2 * r2)
+        far = apart & (first * first * q2**order < allowed)
+        easy = far & (second * second * q2**low < allowed)
+        return far, easy, radius
 
-    return is_far
-
-
-def power(value: Any, exponent: int) -> Any:
-    """Whole power, at least the first, by squares."""
-    if exponent == 1:
-        return value
-    root = power(value, exponent // 2)
-    return root * root * value if exponent % 2 else root * root
+    if isinstance(is_far, FunctionType):
+        # Plain Python: as in machine code, what overflows or is 0 / 0 is no fault, and not far.
+        return np.errstate(all="ignore")(is_far)
+    return is_far  # type: ignore[no-any-return]

@@ -23,7 +23,10 @@ class Limits(NamedTuple):
     opening2: float
     """Square of the largest (r_A + r_B) / R at which expansions are used."""
     error: float
-    """Largest estimated error of the acceleration by one use of an expansion."""
+    """Largest estimated error of the acceleration by one use of an expansion for a leaf; for
+    cells of more particles it falls with the root of their number, as that costs little."""
+    easier: float
+    """How many times less may be neglected where the lower order is used."""
     force: float
     """Largest estimated error of that times the mass of the target cell: of its momentum."""
     rounding: float
@@ -47,10 +50,8 @@ class Desk(NamedTuple):
     """(lanes,) source cells that are tested together."""
     ascending: NDArray[np.int32]
     """(lanes,) 0, 1, 2 ..."""
-    verdict: NDArray[Any]
-    """(1, lanes) what the test says."""
     far: NDArray[np.int32]
-    """(3 lanes,) source cells whose expansions are to be used."""
+    """(2, 3 lanes) source cells whose expansions are to be used, in full and of the lower order."""
     candidates: NDArray[np.int32]
     """Source cells that are left for a target cell's children, lists of all levels end to end."""
     waiting: NDArray[np.int32]
@@ -82,8 +83,7 @@ def desk(operations: Translations, real: type, largest: int, capacity: int) -> D
         place=np.ones((5, LANES), real),
         chosen=np.zeros(LANES, np.int32),
         ascending=np.arange(LANES, dtype=np.int32),
-        verdict=np.zeros((1, LANES), real),
-        far=np.zeros(3 * LANES, np.int32),
+        far=np.zeros((2, 3 * LANES), np.int32),
         candidates=np.empty(capacity, np.int32),
         waiting=np.empty((_STACK, 3), np.int32),
         opened=np.zeros(_STACK, np.int32),

@@ -29,13 +29,15 @@ def _summation(law: str, real: type, potential: bool) -> Callable[..., Any]:
     """Compiled sum for a block of targets over all sources (4, n): writes `out` (4, targets)."""
     attract = attraction(law, real, potential)
 
-    @jit
+    @jit(numba=False)
     def sum_block(target: Any, count: Any, source: Any, size: Any, part: Any, out: Any) -> None:
         out[:] = 0
         for low in range(0, source.shape[1], SOURCES):
             high = min(low + SOURCES, source.shape[1])
             part[:] = 0
-            attract(target, count, source[:, low:high], high - low, (0, 0, 0), size, part)
+            x, y = source[0, low:high], source[1, low:high]
+            z, m = source[2, low:high], source[3, low:high]
+            attract(target, count, (x, y, z, m), high - low, (0, 0, 0), size, part)
             for i in range(count):
                 out[0, i] += part[0, i]
                 out[1, i] += part[1, i]

@@ -119,6 +119,43 @@ def unfolded(kind: Terms, basis: list[Any]) -> Values:
     return whole
 
 
+def shifted_moments(kind: Terms, moments: Values, place: tuple[Any, Any, Any]) -> Values:
+    """All moments around another center, from which the old one is at -place.
+
+    M'_b = sum_c M_c place^(b - c) / (b - c)!, one axis after the other, so that sums are short.
+    """
+    for axis in range(3):
+        highest = 1 if kind.harmonic and axis < 2 else kind.order
+        wanted = indices(kind.order, highest)
+        moments = _along(kind.order, axis, place[axis], moments, wanted, -1)
+    return moments
+
+
+def shifted_terms(kind: Terms, values: Values, place: tuple[Any, Any, Any]) -> list[Any]:
+    """Terms of the basis at a place, from all terms: L'_a = sum_b L_{a + b} place^b / b!."""
+    for axis in (2, 1, 0):
+        values = _along(kind.order, axis, place[axis], values, kind.basis, 1)
+    return [values[a] for a in kind.basis]
+
+
+def _along(
+    order: int, axis: int, step: Any, values: Values, wanted: tuple[Index, ...], way: int
+) -> Values:
+    """Sums over m of values m places along an axis, forwards or backwards, times step^m / m!."""
+    factors = [1.0, step]
+    for m in range(2, order + 1):
+        factors.append(factors[-1] * (step * (1 / m)))
+    sums = []
+    for a in wanted:
+        places = []
+        for m in range(order + 1):
+            b = list(a)
+            b[axis] += way * m
+            places.append((values.get((b[0], b[1], b[2])), m))
+        sums.append([(value, factors[m]) for value, m in places if value is not None])
+    return dict(zip(wanted, products(sums), strict=True))
+
+
 def powers(order: int, ratio: Any, one: Any) -> list[Any]:
     """one, one * ratio, ... up to the `order`-th power."""
     found = [one]
@@ -129,8 +166,6 @@ def powers(order: int, ratio: Any, one: Any) -> list[Any]:
 
 def products(sums: list[list[tuple[Any, Any]]]) -> list[Any]:
     """Sums of products, some at a time: a processor begins the next sum before one is done."""
-    if (tape := getattr(sums[0][0][0], "tape", None)) is not None:
-        return list(tape.sums(sums))
     found: list[Any] = []
     for first in range(0, len(sums), TOGETHER):
         some = sums[first : first + TOGETHER]
@@ -138,7 +173,7 @@ def products(sums: list[list[tuple[Any, Any]]]) -> list[Any]:
         for k in range(max(map(len, some))):
             for n, pairs in enumerate(some):
                 if k < len(pairs):
-                    product = pairs[k][0] * pairs[k][1]
+                    product = scaled(*pairs[k])
                     values[n] = product if values[n] is None else values[n] + product
         found += values
     return found
@@ -152,6 +187,6 @@ def added(values: list[Any]) -> Any:
     return result
 
 
-def scaled(value: Any, factor: float) -> Any:
-    """The product, which costs nothing where the factor is 1."""
-    return value if factor == 1 else value * factor
+def scaled(value: Any, factor: Any) -> Any:
+    """The product, which costs nothing where the factor is the number 1."""
+    return value if isinstance(factor, int | float) and factor == 1 else value * factor

@@ -14,6 +14,9 @@ LEVELS = 21
 """Levels of an octree that fit into a key: bits for each of x, y, z."""
 
 _BITS = 11
+_ROWS = 1 << 16
+"""Rows of a block, at most BLOCKS of them."""
+
 _BLOCKS = 16
 
 
@@ -28,7 +31,7 @@ def _spaced(value: Any) -> Any:
     return (v | (v << np.uint64(2))) & np.uint64(0x1249249249249249)
 
 
-@jit
+@jit(numba=False)
 def _write_keys(position: Any, low: Any, scale: Any, key: Any, order: Any, first: Any) -> None:
     for i in range(key.size):
         k = first + i
@@ -39,14 +42,14 @@ def _write_keys(position: Any, low: Any, scale: Any, key: Any, order: Any, first
         order[i] = k
 
 
-@jit
+@jit(numba=False)
 def _count(key: Any, shift: Any, histogram: Any) -> None:
     histogram[:] = 0
     for i in range(key.size):
         histogram[np.intp((key[i] >> shift) & np.uint64(histogram.size - 1))] += 1
 
 
-@jit
+@jit(numba=False)
 def _accumulate(histograms: Any) -> None:
     total = 0
     for digit in range(histograms.shape[1]):
@@ -56,7 +59,7 @@ def _accumulate(histograms: Any) -> None:
             total += count
 
 
-@jit
+@jit(numba=False)
 def _scatter(key: Any, order: Any, shift: Any, place: Any, new_key: Any, new_order: Any) -> None:
     for i in range(key.size):
         digit = np.intp((key[i] >> shift) & np.uint64(place.size - 1))
@@ -73,24 +76,25 @@ def morton_order(
     A stable radix sort; equal keys keep the order of rows.
     """
     n = len(position)
-    cuts = [n * block // _BLOCKS for block in range(_BLOCKS + 1)]
+    parts = min(max(n // _ROWS, 2), _BLOCKS)
+    cuts = [n * block // parts for block in range(parts + 1)]
     key, order = np.empty(n, np.uint64), np.empty(n, np.uint32)
     new_key, new_order = np.empty_like(key), np.empty_like(order)
-    histograms = np.empty((_BLOCKS, 1 << _BITS), np.uint32)
+    histograms = np.empty((parts, 1 << _BITS), np.uint32)
     scale = (1 << LEVELS) / size * (1 - 2.0**-40)
 
     def write(block: int) -> None:
         rows = slice(cuts[block], cuts[block + 1])
         _write_keys(position, low, scale, key[rows], order[rows], cuts[block])
 
-    share(write, _BLOCKS)
+    share(write, parts)
     for bit in range(0, 3 * LEVELS, _BITS):
         shift = np.uint64(bit)
 
         def count(block: int, key: Any = key, shift: Any = shift) -> None:
             _count(key[cuts[block] : cuts[block + 1]], shift, histograms[block])
 
-        share(count, _BLOCKS)
+        share(count, parts)
         if histograms.sum(axis=0).max() == n:
             continue
         _accumulate(histograms)
@@ -104,6 +108,6 @@ def morton_order(
             rows = slice(cuts[block], cuts[block + 1])
             _scatter(old[0][rows], old[1][rows], shift, histograms[block], *new)
 
-        share(scatter, _BLOCKS)
+        share(scatter, parts)
         key, order, new_key, new_order = new_key, new_order, key, order
     return key, order

@@ -23,12 +23,11 @@ from motes.interact.gravity.tree import (
     START,
     Box,
     Tree,
-    divide_work,
     largest_leaf,
     octree,
-    summarize,
     unpermute,
 )
+from motes.interact.gravity.upward import divide_work, summarize
 from motes.interact.gravity.walk import walker
 from motes.jit import blocks, share, threads
 
@@ -38,10 +37,10 @@ SINGLE_FROM = 4e-6
 LEAVES = 16
 """Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
-LEAVES_OF_A_CLASS = 4
+LEAVES_OF_A_CLASS = 6
 """Target leaves out of each further class, which has twice as many as the one before."""
 
-SAFETY = 0.7
+SAFETY = 0.85
 """Part of the tolerance that the error on the sample may use."""
 
 GROWTH = 3.0
@@ -51,13 +50,16 @@ tolerance, as errors of many expansions cancel and the estimate is an upper boun
 ENOUGH = 5.0
 """How much less it must neglect at least, or it is made again."""
 
+EASIER = 8.0
+"""How many times less an expansion of the lower order may neglect: there are many of them."""
+
 TRIALS = 8
 """Trials before all is summed by pairs."""
 
 TASKS, FEWEST_TASKS, PARTICLES_OF_A_TASK = 128, 8, 2048
 """Parts of the walk; each of the threads takes one after the other. A part costs 0.1 ms more."""
 
-STRICTER = 20.0
+STRICTER = 10.0
 """How much less the walk that the sample is compared with may neglect."""
 
 HIGHEST = {True: 12, False: 8}
@@ -70,6 +72,8 @@ class Plan:
 
     order: int
     """Highest degree of the expansions."""
+    low: int
+    """The same where fewer terms are enough."""
     leaf: int
     """Most particles in a leaf."""
     real: type
@@ -82,8 +86,8 @@ def plan(tolerance: float, law: str) -> Plan:
     """Order, leaf size and precision that are fast at a tolerance, found by measurement."""
     digits = -math.log10(tolerance)
     real = np.float32 if tolerance >= SINGLE_FROM else np.float64
-    order = min(max(2, int(1.2 * digits + 1.5)), HIGHEST[law != "plummer"])
-    return Plan(order=order, leaf=32 if digits < 4 else 48, real=real)
+    order = min(max(2, int(1.3 * digits + 1.5)), HIGHEST[law != "plummer"])
+    return Plan(order, max(order - 2, 1), leaf=32 if digits < 4 else 48, real=real)
 
 
 def multipole(
@@ -143,6 +147,7 @@ class Problem:
         return Limits(
             opening2=self.plan.opening**2,
             error=error,
+            easier=EASIER,
             force=force,
             rounding=rounding,
             few=max(self.plan.order**3 // 2, 16),
@@ -171,7 +176,7 @@ class Problem:
             if share < ENOUGH * strictest:
                 strictest = share / STRICTER
                 strict = limits._replace(
-                    opening2=limits.opening2 / 4,
+                    opening2=limits.opening2 / 2,
                     error=strictest * scale,
                     force=limits.force / STRICTER,
                     rounding=rounding / STRICTER,
@@ -179,7 +184,7 @@ class Problem:
                 exact = self._at(sample, strict)
             part = self._error(sample, self._at(sample, limits), exact) / (SAFETY * tolerance)
             if part <= 1.0:
-                if kept is not None or part > 0.6:
+                if kept is not None or part > 0.75:
                     return limits
                 kept = limits
             elif kept is not None:
@@ -190,7 +195,7 @@ class Problem:
     def solve(self, limits: Limits) -> NDArray[Any]:
         """Sums (4, k) at all targets, in the order of the tree."""
         n = self.targets.place.shape[1]
-        branches = self.targets.cells[divide_work(self.targets)[0], :2]
+        branches = self.targets.cells[divide_work(self.targets)[0][:, 0], :2]
         tasks = min(TASKS, max(n // PARTICLES_OF_A_TASK, FEWEST_TASKS))
         cuts = np.arange(tasks) * n / tasks
         first = np.unique(np.searchsorted(branches[:, START], cuts))
@@ -200,15 +205,15 @@ class Problem:
 
     def unsorted(self, sums: NDArray[Any]) -> NDArray[np.float64]:
         """Sums in the order in which the targets came."""
-        result = np.empty(sums.shape)
+        result = np.empty(sums.shape[::-1])
         order, ranges = self.targets.order, blocks(sums.shape[1], 1 << 16)
 
         share(lambda k: unpermute(sums, order, result, *ranges[k]), len(ranges))
-        return result
+        return result.T
 
     def _walk(self, ranges: NDArray[np.int64], tasks: int, limits: Limits) -> NDArray[Any]:
         """Sums at the targets in some ranges (k, 2) of rows, whole leaves, in a number of tasks."""
-        walk = walker(self.law, self.plan.real, self.potential, self.plan.order)
+        walk = walker(self.law, self.plan.real, self.potential, self.plan.order, self.plan.low)
         operations = translations(self.plan.order, self.law != "plummer")
         same, largest = self.targets is self.sources, largest_leaf(self.targets)
         rows = 4 if self.potential else 3
@@ -232,7 +237,9 @@ class Problem:
         """Leaves in classes by radius, as the largest errors are those of few large leaves."""
         cells = self.targets.cells
         leaves = np.flatnonzero(cells[:, NUMBER] == 0)
-        leaves = leaves[np.argsort(-self.targets.bodies[leaves, RADIUS], kind="stable")]
+        borders = [LEAVES << k for k in range(32) if LEAVES << k < len(leaves)]
+        if borders:
+            leaves = leaves[np.argpartition(-self.targets.bodies[leaves, RADIUS], borders)]
         counts = cells[leaves, END] - cells[leaves, START]
         chosen, weights, first, last = [np.arange(0)], [np.ones(0)], 0, LEAVES
         while first < len(leaves):

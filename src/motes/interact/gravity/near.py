@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from motes.interact.gravity.desk import SOURCES, Desk, Limits
-from motes.interact.gravity.lanes import LANES, read, spread, total, write
+from motes.interact.gravity.lanes import LANES, read, spread, write
 from motes.interact.gravity.pairs import attraction
 from motes.interact.gravity.softening import center_depth, pair_law
 from motes.interact.gravity.tree import END, MASS, RADIUS, START, Tree, X, Y, Z
-from motes.jit import jit
+from motes.jit import EXACT, jit
+from motes.machine.lanes import total
 
 ROUNDING = 6e-8
 """Change of a difference of coordinates by single precision, in units of the largest of them."""
@@ -34,14 +35,15 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
     attract = attraction(law, real, potential, bound=single)
     exact = pair_law(law, np.float64)
     depth = center_depth(law, 1.0)
+    nothing = real(0)
 
-    @jit
+    @jit(flags=EXACT, numba=False)
     def sum_exactly(
         sources: Tree, spans: Any, count: Any, place: Any, size: Any, some: Any, part: Any
     ) -> None:
-        x, y, z = spread(place[0]), spread(place[1]), spread(place[2])
-        sizes = spread(size), spread(1.0 / size if size > 0.0 else 0.0)
-        ax = ay = az = value = spread(0.0)
+        x, y, z = place[0], place[1], place[2]
+        sizes = size, 1.0 / size if size > 0.0 else 0.0
+        ax = ay = az = value = 0.0
         for k in range(count):
             for first in range(spans[k, 0], spans[k, 1], LANES):
                 some[3] = 0.0
@@ -55,7 +57,7 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
                 ax, ay, az, value = ax + s * dx, ay + s * dy, az + s * dz, value + w * m
         part[0], part[1], part[2], part[4] = total(ax), total(ay), total(az), total(value)
 
-    @jit
+    @jit(flags=EXACT, numba=False)
     def sum_packed(
         targets: Tree, sources: Tree, cell: Any, packed: Any, spans: Any, distance: Any, own: Any,
         limits: Limits, desk: Desk,
@@ -64,12 +66,12 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
         count = targets.cells[cell, END] - start
         part, source = desk.part, desk.source
         # Massless sources where no target is make the number a multiple of the lanes.
-        while packed % LANES > 0:
-            source[0, packed] = source[1, packed] = source[2, packed] = 4.0 * distance
-            source[3, packed] = 0.0
-            packed += 1
+        for axis in range(3):
+            write(source[axis], packed, spread(real(4.0 * distance)))
+        write(source[3], packed, spread(nothing))
+        packed = (packed + LANES - 1) // LANES * LANES
         part[:] = 0
-        attract(desk.target, count, source, packed, own, part.dtype.type(limits.size), part)
+        attract(desk.target, count, source, packed, own, real(limits.size), part)
         if single:
             # Twice the change of s dx by coordinates that are wrong by a little.
             blur = 2.0 * ROUNDING * (distance + targets.bodies[cell, RADIUS])
@@ -84,10 +86,10 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
                     )
         for row in range(5):
             if row != 3:
-                for i in range(count):
-                    desk.total[row, i] += part[row, i]
+                for i in range(0, count, LANES):
+                    write(desk.total[row], i, read(desk.total[row], i) + read(part[row], i))
 
-    @jit
+    @jit(flags=EXACT, numba=False)
     def sum_near(
         targets: Tree, sources: Tree, same: Any, cell: Any, low: Any, high: Any, limits: Limits,
         desk: Desk,
@@ -97,14 +99,13 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
         new_x, new_y, new_z, new_m = source[0], source[1], source[2], source[3]
         near = sources.near
         old_x, old_y, old_z, old_m = near[0], near[1], near[2], near[3]
-        kind = source.dtype.type
         x, y, z = targets.bodies[cell, X], targets.bodies[cell, Y], targets.bodies[cell, Z]
         radius = targets.bodies[cell, RADIUS]
         start = targets.cells[cell, START]
         count = targets.cells[cell, END] - start
         for axis in range(3):
-            for i in range(count):
-                target[axis, i] = targets.near[axis, start + i]
+            for i in range(0, count, LANES):
+                write(target[axis], i, read(targets.near[axis], start + i))
         packed = pieces = 0
         distance, own = radius, (0, 0, 0)
         for k in range(low, high):
@@ -114,13 +115,14 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
             if itself and radius == 0.0:
                 if potential and depth > 0.0:
                     for i in range(count):
-                        desk.total[4, i] += kind(bodies[leaf, MASS] * (depth / limits.size))
+                        desk.total[4, i] += bodies[leaf, MASS] * (depth / limits.size)
                 continue
             dx, dy, dz = bodies[leaf, X] - x, bodies[leaf, Y] - y, bodies[leaf, Z] - z
-            reach = np.sqrt(dx * dx + dy * dy + dz * dz) + bodies[leaf, RADIUS]
-            sx = sy = sz = spread(kind(0))
+            # Largest coordinate: what rounding is in proportion to.
+            reach = max(abs(dx), abs(dy), abs(dz)) + bodies[leaf, RADIUS]
+            sx, sy, sz = nothing, nothing, nothing
             if single:
-                sx, sy, sz = spread(kind(dx)), spread(kind(dy)), spread(kind(dz))
+                sx, sy, sz = real(dx), real(dy), real(dz)
             while first < last:
                 taken = min(last - first, SOURCES - packed)
                 distance = max(distance, reach)

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from motes.interact.gravity.lanes import LANES, largest, maximum, read, spread, total
+from motes.interact.gravity.lanes import LANES, maximum, read
 from motes.interact.gravity.softening import PART, pair_law
-from motes.jit import jit
+from motes.jit import EXACT, jit
+from motes.machine.lanes import largest, total
 
 AWAY = 1e18
 """Where a particle is while it is the target, so that it does not pull itself."""
@@ -30,20 +31,20 @@ def attraction(law: str, real: type, potential: bool, bound: bool = False) -> Ca
     pair = pair_law(law, real, not bound)
     zero, one, away, whole = real(0), real(1), real(AWAY), real(1 / PART[real])
 
-    @jit
+    @jit(flags=EXACT, numba=False)
     def attract(
         target: Any, targets: Any, source: Any, sources: Any, own: Any, size: Any, out: Any
     ) -> None:
         xs, ys, zs, ms = source[0], source[1], source[2], source[3]
-        sizes = spread(size), spread(one / size if size > zero else zero)
+        sizes = size, one / size if size > zero else zero
         for i in range(targets):
             itself = bound and own[0] <= i < own[1]
             place = i + own[2] if itself else 0
             kept = xs[place]
             if itself:
                 xs[place] = away
-            x, y, z = spread(target[0, i]), spread(target[1, i]), spread(target[2, i])
-            ax = ay = az = depth = most = spread(zero)
+            x, y, z = target[0, i], target[1, i], target[2, i]
+            ax = ay = az = depth = most = zero
             for j in range(0, sources, LANES):
                 dx, dy, dz, m = read(xs, j) - x, read(ys, j) - y, read(zs, j) - z, read(ms, j)
                 s, w = pair(dx * dx + dy * dy + dz * dz, sizes)

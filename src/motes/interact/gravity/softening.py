@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from motes.interact.gravity.lanes import choose, inverse_root, maximum, rough_inverse_root, spread
-from motes.jit import jit
+from motes.interact.gravity.lanes import inverse_root, maximum
+from motes.jit import EXACT, jit
+from motes.machine.lanes import bits, choose, rough_inverse_root
 
 SUPPORT = 2.8
 """Support radius of the spline in softenings; beyond it the spline's force is exactly Newton's.
@@ -61,13 +62,13 @@ def _powers(real: type) -> Callable[..., Any]:
     """
     a, b, c = real(5 / 3), real(1.5), real(0.5)
 
-    @jit(inline=True)
+    @jit(inline=True, flags=EXACT)
     def single(r2: Any) -> Any:
         y = rough_inverse_root(r2)
         y2 = y * y
-        return y * (y2 * (spread(a) - r2 * y2)), y * (spread(b) - spread(c) * (r2 * y2))
+        return y * (y2 * (a - r2 * y2)), y * (b - c * (r2 * y2))
 
-    @jit(inline=True)
+    @jit(inline=True, flags=EXACT)
     def double(r2: Any) -> Any:
         y = inverse_root(r2)
         return y * y * y, y
@@ -76,7 +77,7 @@ def _powers(real: type) -> Callable[..., Any]:
 
 
 def _plummer(powers: Callable[..., Any]) -> Callable[..., Any]:
-    @jit(inline=True)
+    @jit(inline=True, flags=EXACT)
     def plummer(r2: Any, size: Any) -> Any:
         return powers(r2 + size[0] * size[0])
 
@@ -86,38 +87,44 @@ def _plummer(powers: Callable[..., Any]) -> Callable[..., Any]:
 def _newton(powers: Callable[..., Any], real: Any, guarded: bool) -> Callable[..., Any]:
     least, nothing = real(LEAST[real]), real(0)
 
-    @jit(inline=True)
+    @jit(inline=True, flags=EXACT)
     def newton(r2: Any, size: Any) -> Any:
         if not guarded:
             return powers(r2)
-        s, w = powers(maximum(r2, spread(least)))
-        return s, choose(spread(least), r2, w, spread(nothing))
+        s, w = powers(maximum(r2, least))
+        return s, choose(least < r2, w, nothing)
 
     return newton  # type: ignore[no-any-return]
 
 
 def _spline(powers: Callable[..., Any], real: Any) -> Callable[..., Any]:
-    half, one, least = real(0.5), real(1), real(LEAST[real])
+    half, least = real(0.5), real(LEAST[real])
     part = PART[real]
     f0, f2, f3 = (real(part * c) for c in (32 / 3, -38.4, 32.0))
     g_, g0, g1, g2, g3 = (real(part * c) for c in (-1 / 15, 64 / 3, -48.0, 38.4, -32 / 3))
     v0, v2, v4, v5 = (real(c) for c in (14 / 5, -16 / 3, 48 / 5, -32 / 5))
     w_, w0, w2, w3, w4, w5 = (real(c) for c in (-1 / 15, 16 / 5, -32 / 3, 16.0, -48 / 5, 32 / 15))
 
-    @jit(inline=True)
-    def spline(r2: Any, size: Any) -> Any:
-        size, scale = size
-        cube, inverse = powers(maximum(r2, spread(least)))
+    @jit(inline=True, flags=EXACT)
+    def inside(r2: Any, inverse: Any, size: Any, scale: Any) -> Any:
         u, v = r2 * inverse * scale, inverse * size
-        inner = spread(f0) + u * u * (spread(f2) + spread(f3) * u)
-        outer = spread(g1) + u * (spread(g2) + u * spread(g3))
-        outer = spread(g_) * v * v * v + spread(g0) + u * outer
-        factor = choose(u, spread(half), inner, outer) * (scale * scale * scale)
-        inner = spread(v0) + u * u * (spread(v2) + u * u * (spread(v4) + u * spread(v5)))
-        outer = spread(w2) + u * (spread(w3) + u * (spread(w4) + u * spread(w5)))
-        outer = spread(w_) * v + spread(w0) + u * u * outer
-        depth = choose(u, spread(half), inner, outer) * scale
-        near = spread(one)
-        return choose(u, near, factor, cube), choose(u, near, depth, inverse)
+        inner = f0 + u * u * (f2 + f3 * u)
+        outer = g1 + u * (g2 + u * g3)
+        outer = g_ * v * v * v + g0 + u * outer
+        factor = choose(u < half, inner, outer) * (scale * scale * scale)
+        inner = v0 + u * u * (v2 + u * u * (v4 + u * v5))
+        outer = w2 + u * (w3 + u * (w4 + u * w5))
+        outer = w_ * v + w0 + u * u * outer
+        return factor, choose(u < half, inner, outer) * scale
+
+    @jit(inline=True, flags=EXACT)
+    def spline(r2: Any, size: Any) -> Any:
+        s, w = powers(maximum(r2, least))
+        near = r2 < size[0] * size[0]
+        if bits(near) != 0:
+            # Few pairs are this close, and those that are, are so together.
+            factor, depth = inside(r2, w, size[0], size[1])
+            s, w = choose(near, factor, s), choose(near, depth, w)
+        return s, w
 
     return spline  # type: ignore[no-any-return]

@@ -9,23 +9,24 @@ operation is straight-line code for its order.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 from typing import Any, NamedTuple
 
 from motes.interact.gravity.expansions import (
     UNITS,
     derivatives,
     folded,
-    minus,
     monomials,
     plus,
     powers,
     products,
+    shifted_moments,
+    shifted_terms,
     terms,
     unfolded,
 )
-from motes.interact.gravity.lanes import LANES
-from motes.interact.gravity.traced import (
+from motes.machine.traced import (
+    LANES,
     gathered,
     inverse_root,
     ones,
@@ -37,7 +38,7 @@ from motes.interact.gravity.traced import (
     write_totals,
 )
 
-STRAIGHT = 64
+STRAIGHT = 200
 """Numbers in the longest expansion whose operations are straight-line code."""
 
 Operation = Callable[..., None]
@@ -58,7 +59,8 @@ class Translations(NamedTuple):
     moments_to_local: Operation
     """(balls, chosen, own, table, e2, local): add to `local` (basis, LANES) the terms, in a cell
     with the ball `own`, of source cells whose balls and moments are rows `chosen` of two tables; e2
-    is the squared softening."""
+    is the squared softening. Moments of the first degree are taken for 0, as they are around
+    centers of mass."""
     lanes_to_local: Operation
     """(local, terms): add the lane sums of `local` (basis, LANES) to terms (basis,)."""
     local_to_local: Operation
@@ -78,30 +80,26 @@ def translations(order: int, harmonic: bool) -> Translations:
     """The operations on expansions of one order."""
     kind = terms(order, harmonic)
     basis, every = kind.basis, kind.every
-    operation = partial(traced, looped=len(basis) > STRAIGHT)
 
-    @operation
+    @traced
     def particles_to_moments(place: Any, sums: Any) -> None:
         found = monomials(order, (place[0], place[1], place[2]), place[3])
         write(sums, [old + found[t] for t, old in zip(every, rows(sums, len(every)), strict=True)])
 
-    @operation
+    @traced
     def sums_to_moments(sums: Any, moments: Any) -> None:
         whole = dict(zip(every, rows(sums, len(every)), strict=True))
         write_totals(moments, folded(kind, whole))
 
-    @operation
+    @traced
     def moments_to_moments(place: Any, chosen: Any, table: Any, moments: Any) -> None:
         power = powers(order, place[4], place[3])
         given = gathered(table, chosen, len(basis))
         old = {b: m * power[sum(b)] for b, m in zip(basis, given, strict=True)}
-        shift = monomials(order, (place[0], place[1], place[2]), ones(place[0]))
-        new = products(
-            [[(old[c], shift[minus(b, c)]) for c in basis if min(minus(b, c)) >= 0] for b in every]
-        )
-        write_totals(moments, folded(kind, dict(zip(every, new, strict=True))))
+        new = shifted_moments(kind, old, (place[0], place[1], place[2]))
+        write_totals(moments, folded(kind, new))
 
-    @operation
+    @traced
     def moments_to_local(
         balls: Any, chosen: Any, own: Any, table: Any, e2: Any, local: Any
     ) -> None:
@@ -113,9 +111,10 @@ def translations(order: int, harmonic: bool) -> Translations:
         given = gathered(table, chosen, len(basis))
         moments = {b: m * power[sum(b)] for b, m in zip(basis, given, strict=True)}
         power = powers(order, own[6] * inverse, ones(x))
+        some = [b for b in basis if sum(b) != 1]
         values = products(
             [
-                [(moments[b], slopes[plus(a, b)]) for b in basis if sum(a) + sum(b) <= order]
+                [(moments[b], slopes[plus(a, b)]) for b in some if sum(a) + sum(b) <= order]
                 for a in basis
             ]
         )
@@ -127,20 +126,14 @@ def translations(order: int, harmonic: bool) -> Translations:
         for row in range(len(basis)):
             terms[row] = terms[row] + total(local[row])
 
-    @operation
+    @traced
     def local_to_local(place: Any, terms: Any, table: Any, first: Any) -> None:
         whole = unfolded(kind, rows(terms, len(basis)))
-        shift = monomials(order, (place[0], place[1], place[2]), ones(place[0]))
         power = powers(order, place[4], ones(place[4]))
-        new = products(
-            [
-                [(whole[plus(a, b)], shift[b]) for b in every if sum(a) + sum(b) <= order]
-                for a in basis
-            ]
-        )
+        new = shifted_terms(kind, whole, (place[0], place[1], place[2]))
         scattered([v * power[sum(a)] for a, v in zip(basis, new, strict=True)], table, first)
 
-    @operation
+    @traced
     def local_to_particles(place: Any, terms: Any, scale: Any, out: Any) -> None:
         whole = unfolded(kind, rows(terms, len(basis)))
         shift = monomials(order, (place[0], place[1], place[2]), ones(place[0]))

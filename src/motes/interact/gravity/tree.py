@@ -3,17 +3,13 @@
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.interact.gravity.lanes import LANES
 from motes.interact.gravity.morton import LEVELS, morton_order
-from motes.interact.gravity.translations import padded, translations
 from motes.jit import blocks, jit, share
 
 START, END, FIRST, NUMBER = 0, 1, 2, 3
@@ -29,15 +25,6 @@ only, and expansions around its center hardly converge at its edge.
 
 FINER = 1
 """Levels from a usual leaf up to one that is much larger."""
-
-TASKS = 64
-"""Parts of the upward pass."""
-
-NOTHING = (8.0, 8.0, 8.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-"""A ball without mass, outside of the box: what lanes that are left over are about."""
-
-LIGHT = 1e-30
-"""Weight of massless particles in a center, where the masses of all are about 1."""
 
 
 class Tree(NamedTuple):
@@ -76,7 +63,7 @@ def _first_of(key: Any, low: Any, high: Any, shift: Any, octant: Any) -> Any:
     return low
 
 
-@jit
+@jit(numba=False)
 def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
     """Write the rows of all cells; return their number, or 0 if there is no room.
 
@@ -131,7 +118,7 @@ def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
     return count
 
 
-@jit
+@jit(numba=False)
 def _permute(
     points: Any, mass: Any, low: Any, length: Any, order: Any, place: Any, first: Any, last: Any
 ) -> None:
@@ -143,132 +130,13 @@ def _permute(
         place[3, i] = mass[k]
 
 
-@jit
+@jit(numba=False)
 def unpermute(sums: Any, order: Any, result: Any, first: Any, last: Any) -> None:
-    """Write columns `first` to `last` of sums in the tree's order to where they came from."""
-    for row in range(sums.shape[0]):
-        for i in range(first, last):
-            result[row, order[i]] = sums[row, i]
-
-
-@jit
-def _measure(tree: Tree, cell: Any) -> None:
-    """Fill in a cell's body, its children's being there."""
-    cells, bodies, place = tree.cells, tree.bodies, tree.place
-    start, end, first_child, number = cells[cell]
-    x = y = z = mass = 0.0
-    weights = LIGHT * (end - start)
-    if number == 0:
-        for i in range(start, end):
-            m = place[3, i]
-            mass += m
-            m += LIGHT
-            x += m * place[0, i]
-            y += m * place[1, i]
-            z += m * place[2, i]
-    else:
-        for child in range(first_child, first_child + number):
-            m = bodies[child, MASS]
-            mass += m
-            m += LIGHT * (cells[child, END] - cells[child, START])
-            x += m * bodies[child, X]
-            y += m * bodies[child, Y]
-            z += m * bodies[child, Z]
-    weights += mass
-    x, y, z = x / weights, y / weights, z / weights
-    xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
-    r2 = 0.0
-    for i in range(xs.size):
-        dx, dy, dz = xs[i] - x, ys[i] - y, zs[i] - z
-        r2 = max(r2, dx * dx + dy * dy + dz * dz)
-    bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
-    bodies[cell, RADIUS], bodies[cell, MASS] = np.sqrt(r2), mass
-    ball = tree.balls[cell]
-    for axis in range(3):
-        ball[axis] = bodies[cell, axis]
-        ball[LOW + axis] = bodies[cell, axis] - ball[axis]
-    ball[BALL_RADIUS], ball[BALL_MASS] = cell_unit(np.sqrt(r2)), mass
-
-
-@jit
-def _approach(tree: Tree, cell: Any, relative: bool) -> None:
-    """Write a leaf's particles as the pairs see them."""
-    start, end = tree.cells[cell, START], tree.cells[cell, END]
-    for axis in range(3):
-        old, new = tree.place[axis, start:end], tree.near[axis, start:end]
-        center = tree.bodies[cell, axis] if relative else 0.0
-        for i in range(old.size):
-            new[i] = old[i] - center
-    old, new = tree.place[3, start:end], tree.near[3, start:end]
-    for i in range(old.size):
-        new[i] = old[i]
-
-
-@cache
-def _summation(order: int, harmonic: bool) -> Callable[..., None]:
-    """Compiled function that fills in bodies, near and moments of cells in ranges (k, 2).
-
-    (tree, ranges, relative, place, chosen, sums) -> None; the last cell of a range is the first.
-    """
-    operations = translations(order, harmonic)
-    particles_to_moments = operations.particles_to_moments
-    sums_to_moments = operations.sums_to_moments
-    moments_to_moments = operations.moments_to_moments
-
-    @jit
-    def moments_of_leaf(tree: Tree, cell: Any, place: Any, sums: Any) -> None:
-        start, end = tree.cells[cell, START], tree.cells[cell, END]
-        body = tree.bodies[cell]
-        scale = 1.0 / cell_unit(body[RADIUS])
-        sums[:] = 0
-        for first in range(start, end, LANES):
-            for lane in range(LANES):
-                i = min(first + lane, end - 1)
-                place[0, lane] = (body[X] - tree.place[0, i]) * scale
-                place[1, lane] = (body[Y] - tree.place[1, i]) * scale
-                place[2, lane] = (body[Z] - tree.place[2, i]) * scale
-                place[3, lane] = tree.place[3, i] if first + lane < end else 0.0
-            particles_to_moments(place, sums)
-        sums_to_moments(sums, tree.moments[cell])
-
-    @jit
-    def moments_of_parent(tree: Tree, cell: Any, place: Any, chosen: Any) -> None:
-        bodies = tree.bodies
-        first, number = tree.cells[cell, FIRST], tree.cells[cell, NUMBER]
-        body = bodies[cell]
-        scale = 1.0 / cell_unit(body[RADIUS])
-        for lane in range(LANES):
-            child = first + lane
-            chosen[lane] = first
-            place[3, lane] = 0.0
-            if lane < number:
-                chosen[lane] = child
-                place[0, lane] = (body[X] - bodies[child, X]) * scale
-                place[1, lane] = (body[Y] - bodies[child, Y]) * scale
-                place[2, lane] = (body[Z] - bodies[child, Z]) * scale
-                place[3, lane] = 1.0
-                place[4, lane] = cell_unit(bodies[child, RADIUS]) * scale
-        moments_to_moments(place, chosen, tree.moments, tree.moments[cell])
-
-    @jit
-    def fill(tree: Tree, ranges: Any, relative: bool, place: Any, chosen: Any, sums: Any) -> None:
-        for some in range(ranges.shape[0]):
-            first, last = ranges[some, 0], ranges[some, 1]
-            for back in range(last - first):
-                cell = last - 1 - back
-                is_leaf = tree.cells[cell, NUMBER] == 0
-                _measure(tree, cell)
-                if is_leaf:
-                    _approach(tree, cell, relative)
-                if tree.moments.shape[0] > 0:
-                    if is_leaf:
-                        moments_of_leaf(tree, cell, place, sums)
-                    else:
-                        moments_of_parent(tree, cell, place, chosen)
-                    # Single precision would lose digits of the sum of many equal masses.
-                    tree.moments[cell, 0] = tree.bodies[cell, MASS]
-
-    return fill  # type: ignore[no-any-return]
+    """Write columns `first` to `last` of sums in the tree's order to rows where they came from."""
+    for i in range(first, last):
+        place = order[i]
+        for row in range(sums.shape[0]):
+            result[place, row] = sums[row, i]
 
 
 @jit(inline=True)
@@ -327,61 +195,8 @@ def _usual_level(key: NDArray[np.uint64], cells: NDArray[np.int32]) -> int:
     return int(level[order[np.searchsorted(share, share[-1] / 2)]])
 
 
-def summarize(tree: Tree, order: int, harmonic: bool, real: type, sources: bool) -> Tree:
-    """The tree with bodies, and for `sources` moments, filled in from places and masses."""
-    branches, stem = divide_work(tree)
-    operations, fill = translations(order, harmonic), _summation(order, harmonic)
-    count = len(tree.cells) + 1 if sources else 0
-    near: NDArray[Any] = np.empty((4, tree.place.shape[1] + LANES), real)
-    near[:, -LANES:] = 0
-    balls: NDArray[Any] = np.empty((len(tree.cells) + LANES, 8), real)
-    balls[-LANES:] = NOTHING
-    moments: NDArray[Any] = np.zeros((count, padded(operations.basis)), real)
-    tree = tree._replace(moments=moments, near=near, balls=balls)
-
-    def cells(ranges: list[tuple[int, int]]) -> None:
-        place: NDArray[Any] = np.ones((5, LANES), real)
-        sums: NDArray[Any] = np.empty((operations.every, LANES), real)
-        chosen = np.zeros(LANES, np.int32)
-        fill(
-            tree, np.array(ranges, np.int64).reshape(-1, 2), real is np.float32, place, chosen, sums
-        )
-
-    tasks = np.array_split(branches, min(len(branches), TASKS))
-    ends = {cell: (int(tree.cells[cell, FIRST]), _end(tree, cell)) for cell in branches}
-
-    def branch(k: int) -> None:
-        cells([r for cell in tasks[k] for r in (ends[int(cell)], (int(cell), int(cell) + 1))])
-
-    share(branch, len(tasks))
-    cells([(cell, cell + 1) for cell in reversed(stem)])
-    return tree
-
-
-def _end(tree: Tree, cell: int) -> int:
-    """The row after a cell's last descendant."""
-    first, number = (int(k) for k in tree.cells[cell, [FIRST, NUMBER]])
-    return _end(tree, first + number - 1) if number else first
-
-
 def largest_leaf(tree: Tree) -> int:
     """Most particles in a leaf."""
     cells = tree.cells
     leaves = cells[:, NUMBER] == 0
     return int((cells[leaves, END] - cells[leaves, START]).max())
-
-
-def divide_work(tree: Tree) -> tuple[list[int], list[int]]:
-    """Cells whose descendants are one task each, and the cells above them."""
-    n = tree.place.shape[1]
-    limit = min(max(n // 64, 64), 8192)
-    branches, stem, waiting = [], [], [0]
-    while waiting:
-        cell = waiting.pop()
-        start, end, first, number = (int(v) for v in tree.cells[cell])
-        if end - start <= limit or not number:
-            branches.append(cell)
-        else:
-            stem.append(cell)
-            waiting += reversed(range(first, first + number))
-    return branches, stem

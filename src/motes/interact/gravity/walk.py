@@ -9,13 +9,16 @@ Dehnen, Journal of Computational Physics 179 (2002) 27, with lists owned by the 
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from motes.interact.gravity.acceptance import acceptance
+import numpy as np
+
+from motes.interact.gravity.acceptance import acceptance, columns
 from motes.interact.gravity.desk import Desk, Limits
-from motes.interact.gravity.lanes import LANES, read, spread, write
+from motes.interact.gravity.lanes import LANES, read, write
 from motes.interact.gravity.near import near_field
 from motes.interact.gravity.translations import translations
 from motes.interact.gravity.tree import (
@@ -32,27 +35,47 @@ from motes.interact.gravity.tree import (
     Z,
     cell_unit,
 )
-from motes.jit import jit
+from motes.jit import EXACT, jit
+from motes.machine.lanes import bits, lowest, put_some
+
+FULL = 16.0
+"""Particles of a usual leaf, for which the limit of the error holds as it is."""
 
 
 @cache
-def walker(law: str, real: type, potential: bool, order: int) -> Callable[..., Any]:
+def walker(law: str, real: type, potential: bool, order: int, low_order: int) -> Callable[..., Any]:
     """Compiled walk for a pair law, numbers of type `real`, with or without the potential.
 
     (targets, sources, same, ranges, limits, desk, out) -> int: writes to rows 0 to 2 of `out`
     (4, n) the sums of m s dx, and with `potential` to row 3 those of m w, for the particles of
     `targets` in `ranges` (k, 2), first and last + 1, which are whole cells. Returns 0, or 1 if the
     lists of candidates need more room. `same`: the two trees are one, and a particle is among its
-    own sources.
+    own sources. Source cells whose expansion of order `low_order` is enough are taken with that.
     """
     sum_near = near_field(law, real, potential)
-    operations = translations(order, law != "plummer")
+    harmonic = law != "plummer"
+    operations = translations(order, harmonic)
     moments_to_local, local_to_local = operations.moments_to_local, operations.local_to_local
     lanes_to_local, local_to_particles = operations.lanes_to_local, operations.local_to_particles
-    is_far = acceptance(order)
-    zero = real(0)
+    easily_to_local = translations(low_order, harmonic).moments_to_local
+    is_far = acceptance(order, low_order)
+    single = real is np.float32
 
-    @jit
+    @jit(flags=EXACT, numba=False)
+    def expand(sources: Tree, own: Any, e2: Any, far: Any, count: Any, desk: Desk) -> None:
+        """Add the local terms of the first LANES or fewer cells of a list."""
+        for lane in range(count, LANES):
+            far[lane] = sources.cells.shape[0]
+        moments_to_local(sources.balls, far, own, sources.moments, e2, desk.gathered)
+
+    @jit(flags=EXACT, numba=False)
+    def expand_easily(sources: Tree, own: Any, e2: Any, far: Any, count: Any, desk: Desk) -> None:
+        """The same with expansions of the lower order."""
+        for lane in range(count, LANES):
+            far[lane] = sources.cells.shape[0]
+        easily_to_local(sources.balls, far, own, sources.moments, e2, desk.gathered)
+
+    @jit(flags=EXACT, numba=False)
     def gather(
         targets: Tree, sources: Tree, cell: Any, low: Any, high: Any, limits: Limits, desk: Desk
     ) -> Any:
@@ -61,54 +84,81 @@ def walker(law: str, real: type, potential: bool, order: int) -> Callable[..., A
         Candidates are those from `low` to `high`; the rest is written from `high` on. Returns -1 if
         there is no room.
         """
-        opened, candidates, chosen, far = desk.opened, desk.candidates, desk.chosen, desk.far
-        cells, balls, verdict = sources.cells, sources.balls, desk.verdict
+        opened, candidates, chosen = desk.opened, desk.candidates, desk.chosen
+        far, easy = desk.far[0], desk.far[1]
         own = targets.balls[cell]
         radius, e2 = own[BALL_RADIUS], real(limits.e2)
         count = targets.cells[cell, END] - targets.cells[cell, START]
         is_leaf = targets.cells[cell, NUMBER] == 0
-        allowed = min(limits.error, limits.force / max(targets.bodies[cell, MASS], 1e-300))
-        stricter = real(1.0 / allowed)
+        error = limits.error / math.sqrt(max(count, FULL) / FULL)
+        allowed = min(error, limits.force / max(targets.bodies[cell, MASS], 1e-300))
+        allowed = max(allowed, real(1e-30))
+        stricter = real(1.0 / allowed), real(limits.easier / allowed)
+        few = np.int32(limits.few // count)
         ascending = read(desk.ascending, 0)
         opening2, reach = real(limits.opening2), real(limits.reach)
         desk.gathered[:] = 0
-        top, depth, accepted = high, 0, 0
-        while True:
-            while depth < LANES and low < high:
-                opened[depth] = candidates[low]
-                low, depth = low + 1, depth + 1
-            number = min(depth, LANES)
-            depth -= number
-            write(chosen, 0, read(opened, depth))
-            if number > 0:
-                if top + LANES > candidates.size:
-                    return -1
-                is_far(balls, chosen, own, stricter, opening2, reach, e2, verdict)
-            # Each cell is written to every list, and only the end of its own moves on: where a
-            # cell belongs cannot be foreseen by a processor, and a wrong guess costs more.
-            for lane in range(number):
-                other = chosen[lane]
-                many, children = cells[other, END] - cells[other, START], cells[other, NUMBER]
-                separate = verdict[0, lane] > zero
-                if is_leaf:
-                    separate = separate & ((children > 0) | (many * count > limits.few))
-                divides = (children > 0) & (is_leaf | (balls[other, BALL_RADIUS] >= radius))
-                far[accepted] = other
-                accepted += separate
-                candidates[top] = other
-                top += ~separate & ~divides
-                write(opened, depth, spread(cells[other, FIRST]) + ascending)
-                depth += children * (~separate & divides)
-            if accepted >= LANES or (depth == 0 and low == high):
-                if accepted == 0:
-                    return top
-                for lane in range(accepted, LANES):
-                    far[lane] = cells.shape[0]
-                moments_to_local(balls, far, own, sources.moments, e2, desk.gathered)
-                accepted = max(accepted - LANES, 0)
+        top, depth, accepted, easily = high, 0, 0, 0
+        while depth > 0 or low < high:
+            # What is not tested in this round is left on the stack of cells to test.
+            if depth >= LANES:
+                number = LANES
+                depth -= LANES
+                some = read(opened, depth)
+            elif high - low >= LANES:
+                number = LANES
+                some = read(candidates, low)
+                low += LANES
+            else:
+                while low < high and depth < LANES:
+                    opened[depth] = candidates[low]
+                    low, depth = low + 1, depth + 1
+                number, depth = depth, 0
+                some = read(opened, 0)
+            write(chosen, 0, some)
+            if top + LANES > candidates.size:
+                return -1
+            separate, low_order_does, others = is_far(
+                sources.balls, chosen, own, stricter, opening2, reach, e2
+            )
+            start, end, _, children = columns(sources.cells, chosen)
+            valid = ascending < np.int32(number)
+            inner = children > np.int32(0)
+            if is_leaf:
+                separate = separate & (inner | (np.int32(end - start) > few))
+                divides = inner
+            else:
+                divides = inner & (others >= radius)
+            separate = separate & valid
+            remain = valid & ~separate
+            accepted += put_some(far, accepted, some, separate & ~low_order_does)
+            easily += put_some(easy, easily, some, separate & low_order_does)
+            top += put_some(candidates, top, some, remain & ~divides)
+            marks = bits(remain & divides)
+            while marks != 0:
+                other = chosen[lowest(marks)]
+                marks = marks & (marks - np.uint64(1))
+                write(opened, depth, sources.cells[other, FIRST] + ascending)
+                depth += sources.cells[other, NUMBER]
+            if accepted >= LANES:
+                expand(sources, own, e2, far, LANES, desk)
+                accepted -= LANES
                 write(far, 0, read(far, LANES))
+            if easily >= LANES:
+                expand_easily(sources, own, e2, easy, LANES, desk)
+                easily -= LANES
+                write(easy, 0, read(easy, LANES))
+        if accepted > 0 and accepted + easily <= LANES:
+            for lane in range(easily):
+                far[accepted + lane] = easy[lane]
+            accepted, easily = accepted + easily, 0
+        if accepted > 0:
+            expand(sources, own, e2, far, accepted, desk)
+        if easily > 0:
+            expand_easily(sources, own, e2, easy, easily, desk)
+        return top
 
-    @jit
+    @jit(flags=EXACT, numba=False)
     def wait(
         targets: Tree, cell: Any, begin: Any, end: Any, low: Any, high: Any, depth: Any, desk: Desk
     ) -> Any:
@@ -118,10 +168,10 @@ def walker(law: str, real: type, potential: bool, order: int) -> Callable[..., A
         lane = 0
         for child in range(cells[cell, FIRST], cells[cell, FIRST] + cells[cell, NUMBER]):
             if cells[child, START] < end and cells[child, END] > begin:
-                place[0, lane] = real((bodies[child, X] - bodies[cell, X]) * scale)
-                place[1, lane] = real((bodies[child, Y] - bodies[cell, Y]) * scale)
-                place[2, lane] = real((bodies[child, Z] - bodies[cell, Z]) * scale)
-                place[4, lane] = real(cell_unit(bodies[child, RADIUS]) * scale)
+                place[0, lane] = (bodies[child, X] - bodies[cell, X]) * scale
+                place[1, lane] = (bodies[child, Y] - bodies[cell, Y]) * scale
+                place[2, lane] = (bodies[child, Z] - bodies[cell, Z]) * scale
+                place[4, lane] = cell_unit(bodies[child, RADIUS]) * scale
                 waiting = desk.waiting[depth + lane]
                 waiting[0], waiting[1], waiting[2] = child, low, high
                 lane += 1
@@ -129,25 +179,23 @@ def walker(law: str, real: type, potential: bool, order: int) -> Callable[..., A
         local_to_local(place, desk.local[depth], desk.local, depth)
         return depth + lane
 
-    @jit
+    @jit(flags=EXACT, numba=False)
     def finish(targets: Tree, cell: Any, terms: Any, desk: Desk) -> None:
         """Begin the sums of a leaf with the field of its local terms."""
-        place, out, body = desk.place, desk.gathered, targets.bodies[cell]
+        place, out, body, total = desk.place, desk.gathered, targets.bodies[cell], desk.total
         start, end = targets.cells[cell, START], targets.cells[cell, END]
-        scale = 1.0 / cell_unit(body[RADIUS])
+        scale = real(1.0 / cell_unit(body[RADIUS]))
         for first in range(0, end - start, LANES):
-            for lane in range(LANES):
-                i = min(start + first + lane, end - 1)
-                place[0, lane] = real((targets.place[0, i] - body[X]) * scale)
-                place[1, lane] = real((targets.place[1, i] - body[Y]) * scale)
-                place[2, lane] = real((targets.place[2, i] - body[Z]) * scale)
-            local_to_particles(place, terms, real(scale), out)
-            for lane in range(LANES):
-                for axis in range(3):
-                    desk.total[axis, first + lane] = out[axis, lane]
-                desk.total[4, first + lane] = out[3, lane]
+            for axis in range(3):
+                center = real(0.0 if single else body[axis])
+                near = read(targets.near[axis], start + first)
+                write(place[axis], 0, (near - center) * scale)
+            local_to_particles(place, terms, scale, out)
+            for axis in range(3):
+                write(total[axis], first, read(out[axis], 0))
+            write(total[4], first, read(out[3], 0))
 
-    @jit
+    @jit(flags=EXACT, numba=False)
     def walk(
         targets: Tree, sources: Tree, same: Any, ranges: Any, limits: Limits, desk: Desk, out: Any
     ) -> Any:

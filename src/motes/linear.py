@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motes.jit import EXACT, jit
-from motes.ode.arithmetic import Array
+
+Array = NDArray[Any]
 
 KRYLOV = 60
 """Most vectors of a Krylov basis."""

@@ -1,0 +1,242 @@
+"""The upward pass: what the cells of a tree contain, from their particles and their children."""
+
+# mypy: disallow-untyped-decorators=False
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.interact.gravity.lanes import LANES, maximum, read, spread, write
+from motes.interact.gravity.morton import LEVELS
+from motes.interact.gravity.translations import padded, translations
+from motes.interact.gravity.tree import (
+    BALL_MASS,
+    BALL_RADIUS,
+    END,
+    FIRST,
+    LOW,
+    MASS,
+    NUMBER,
+    RADIUS,
+    START,
+    Tree,
+    X,
+    Y,
+    Z,
+    cell_unit,
+)
+from motes.jit import EXACT, jit, share
+from motes.machine.lanes import choose, largest
+
+TASKS = 64
+"""Parts of the upward pass."""
+
+NOTHING = (8.0, 8.0, 8.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+"""A ball without mass, outside of the box: what lanes that are left over are about."""
+
+LIGHT = 1e-30
+"""Weight of massless particles in a center, where the masses of all are about 1."""
+
+
+@jit(numba=False)
+def _measure(tree: Tree, cell: Any) -> None:
+    """Fill in a cell's body, its children's being there."""
+    cells, bodies, place = tree.cells, tree.bodies, tree.place
+    start, end, first_child, number = cells[cell]
+    x = y = z = mass = 0.0
+    weights = LIGHT * (end - start)
+    if number == 0:
+        for i in range(start, end):
+            m = place[3, i]
+            mass += m
+            m += LIGHT
+            x += m * place[0, i]
+            y += m * place[1, i]
+            z += m * place[2, i]
+    else:
+        for child in range(first_child, first_child + number):
+            m = bodies[child, MASS]
+            mass += m
+            m += LIGHT * (cells[child, END] - cells[child, START])
+            x += m * bodies[child, X]
+            y += m * bodies[child, Y]
+            z += m * bodies[child, Z]
+    weights += mass
+    x, y, z = x / weights, y / weights, z / weights
+    xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
+    whole = xs.size // LANES * LANES
+    most, r2 = spread(0.0), 0.0
+    for i in range(0, whole, LANES):
+        dx, dy, dz = read(xs, i) - x, read(ys, i) - y, read(zs, i) - z
+        most = maximum(dx * dx + dy * dy + dz * dz, most)
+    for i in range(whole, xs.size):
+        dx, dy, dz = xs[i] - x, ys[i] - y, zs[i] - z
+        r2 = max(r2, dx * dx + dy * dy + dz * dz)
+    r2 = max(r2, largest(most))
+    bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
+    bodies[cell, RADIUS], bodies[cell, MASS] = np.sqrt(r2), mass
+    ball = tree.balls[cell]
+    for axis in range(3):
+        ball[axis] = bodies[cell, axis]
+        ball[LOW + axis] = bodies[cell, axis] - ball[axis]
+    ball[BALL_RADIUS], ball[BALL_MASS] = cell_unit(np.sqrt(r2)), mass
+
+
+@jit(numba=False)
+def _approach(tree: Tree, cell: Any, relative: bool) -> None:
+    """Write a leaf's particles as the pairs see them."""
+    start, end = tree.cells[cell, START], tree.cells[cell, END]
+    for axis in range(3):
+        old, new = tree.place[axis, start:end], tree.near[axis, start:end]
+        center = tree.bodies[cell, axis] if relative else 0.0
+        for i in range(old.size):
+            new[i] = old[i] - center
+    old, new = tree.place[3, start:end], tree.near[3, start:end]
+    for i in range(old.size):
+        new[i] = old[i]
+
+
+@cache
+def _summation(order: int, harmonic: bool) -> Callable[..., None]:
+    """Compiled function that fills in bodies, near and moments of cells in ranges (k, 2).
+
+    (tree, ranges, relative, place, chosen, ascending, sums) -> None; the last cell of a range is
+    the first.
+    """
+    operations = translations(order, harmonic)
+    particles_to_moments = operations.particles_to_moments
+    sums_to_moments = operations.sums_to_moments
+    moments_to_moments = operations.moments_to_moments
+
+    @jit(flags=EXACT, numba=False)
+    def moments_of_leaf(
+        tree: Tree, cell: Any, relative: bool, place: Any, ascending: Any, sums: Any
+    ) -> None:
+        start, end = tree.cells[cell, START], tree.cells[cell, END]
+        body, near, kind = tree.bodies[cell], tree.near, tree.near.dtype.type
+        scale, zero = kind(1.0 / cell_unit(body[RADIUS])), kind(0)
+        sums[:] = 0
+        for first in range(start, end, LANES):
+            inside = read(ascending, 0) < np.int32(end - first)
+            for axis in range(3):
+                center = kind(0.0 if relative else body[axis])
+                away = (center - read(near[axis], first)) * scale
+                write(place[axis], 0, choose(inside, away, zero))
+            write(place[3], 0, choose(inside, read(near[3], first), zero))
+            particles_to_moments(place, sums)
+        sums_to_moments(sums, tree.moments[cell])
+
+    @jit(flags=EXACT, numba=False)
+    def moments_of_parent(tree: Tree, cell: Any, place: Any, chosen: Any) -> None:
+        bodies = tree.bodies
+        first, number = tree.cells[cell, FIRST], tree.cells[cell, NUMBER]
+        body = bodies[cell]
+        scale = 1.0 / cell_unit(body[RADIUS])
+        for lane in range(LANES):
+            child = first + lane
+            chosen[lane] = first
+            place[3, lane] = 0.0
+            if lane < number:
+                chosen[lane] = child
+                place[0, lane] = (body[X] - bodies[child, X]) * scale
+                place[1, lane] = (body[Y] - bodies[child, Y]) * scale
+                place[2, lane] = (body[Z] - bodies[child, Z]) * scale
+                place[3, lane] = 1.0
+                place[4, lane] = cell_unit(bodies[child, RADIUS]) * scale
+        moments_to_moments(place, chosen, tree.moments, tree.moments[cell])
+
+    @jit(flags=EXACT, numba=False)
+    def fill(
+        tree: Tree, ranges: Any, relative: bool, place: Any, chosen: Any, ascending: Any, sums: Any
+    ) -> None:
+        for some in range(ranges.shape[0]):
+            first, last = ranges[some, 0], ranges[some, 1]
+            for back in range(last - first):
+                cell = last - 1 - back
+                is_leaf = tree.cells[cell, NUMBER] == 0
+                _measure(tree, cell)
+                if is_leaf:
+                    _approach(tree, cell, relative)
+                if tree.moments.shape[0] > 0:
+                    if is_leaf:
+                        moments_of_leaf(tree, cell, relative, place, ascending, sums)
+                    else:
+                        moments_of_parent(tree, cell, place, chosen)
+                    # Single precision would lose digits of the sum of many equal masses.
+                    tree.moments[cell, 0] = tree.bodies[cell, MASS]
+
+    return fill  # type: ignore[no-any-return]
+
+
+def summarize(tree: Tree, order: int, harmonic: bool, real: type, sources: bool) -> Tree:
+    """The tree with bodies, and for `sources` moments, filled in from places and masses."""
+    branches, stem = divide_work(tree)
+    operations, fill = translations(order, harmonic), _summation(order, harmonic)
+    count = len(tree.cells) + 1 if sources else 0
+    near: NDArray[Any] = np.empty((4, tree.place.shape[1] + LANES), real)
+    near[:, -LANES:] = 0
+    balls: NDArray[Any] = np.empty((len(tree.cells) + LANES, 8), real)
+    balls[-LANES:] = NOTHING
+    moments: NDArray[Any] = np.empty((count, padded(operations.basis)), real)
+    moments[-1:] = 0  # Of rows that lanes which are left over are about.
+    ascending = np.arange(LANES, dtype=np.int32)
+    tree = tree._replace(moments=moments, near=near, balls=balls)
+
+    def cells(ranges: Any) -> None:
+        place: NDArray[Any] = np.ones((5, LANES), real)
+        sums: NDArray[Any] = np.empty((operations.every, LANES), real)
+        chosen = np.zeros(LANES, np.int32)
+        given = np.asarray(ranges, np.int64).reshape(-1, 2)
+        fill(tree, given, real is np.float32, place, chosen, ascending, sums)
+
+    tasks = np.array_split(branches, min(len(branches), TASKS))
+
+    def branch(k: int) -> None:
+        some = tasks[k]
+        ranges = np.empty((len(some), 2, 2), np.int64)
+        ranges[:, 0, 0], ranges[:, 0, 1] = tree.cells[some[:, 0], FIRST], some[:, 1]
+        ranges[:, 1, 0], ranges[:, 1, 1] = some[:, 0], some[:, 0] + 1
+        cells(ranges)
+
+    share(branch, len(tasks))
+    cells([(cell, cell + 1) for cell in stem[::-1]])
+    return tree
+
+
+def divide_work(tree: Tree) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Cells whose descendants are one task each, (k, 2) with the row after the last of these; and
+    the cells above them, each before its children."""
+    limit = min(max(tree.place.shape[1] // 64, 64), 8192)
+    branches = np.empty((len(tree.cells), 2), np.int64)
+    stem = np.empty(len(tree.cells), np.int64)
+    found, above = _divide_work(tree.cells, limit, branches, stem)
+    return branches[:found], stem[:above]
+
+
+@jit(numba=False)
+def _divide_work(cells: Any, limit: Any, branches: Any, stem: Any) -> Any:
+    waiting = np.empty(8 * LEVELS + 1, np.int64)
+    waiting[0] = 0
+    depth, found, above = 1, 0, 0
+    while depth > 0:
+        depth -= 1
+        cell = waiting[depth]
+        start, end, first, number = cells[cell]
+        # What comes next in this order has its descendants after those of the last branch.
+        if found > 0 and branches[found - 1, 1] == 0:
+            branches[found - 1, 1] = first
+        if end - start <= limit or number == 0:
+            branches[found, 0], branches[found, 1] = cell, 0
+            found += 1
+        else:
+            stem[above] = cell
+            above += 1
+            for back in range(number):
+                waiting[depth] = first + number - 1 - back
+                depth += 1
+    branches[found - 1, 1] = cells.shape[0]
+    return found, above
