@@ -311,8 +311,8 @@ class Splitting:
         if len(self.kicks) != len(self.drifts) + 1:
             raise TableauError("a splitting has one kick more than drifts; the last may be 0")
         _check("drifts: ", 1, 1, self.drifts, [1.0] * len(self.drifts), 1.0)
-        b_position, b = self.ends
-        _check_nystrom(self.order, b, b_position, self.weight)
+        position, velocity = self.ends
+        _check_nystrom(self.order, velocity, position, self.weight)
 
     @property
     def weight(self) -> rooted_trees.Weight:

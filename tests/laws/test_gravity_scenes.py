@@ -73,10 +73,10 @@ def test_a_tolerance_keeps_the_motion_of_direct_sums() -> None:
     """Accelerations within 1e-4 move stars from rest by at most that times a t^2 / 2, rms."""
 
     def stars(tolerance: float) -> np.ndarray:
-        emitter = motes.emit.Sphere(burst=[{"count": 3000}], radius=1.0)
+        emitter = motes.emit.Sphere(burst=[{"count": 7000}], radius=1.0)
         law = motes.interact.Gravity(G=1.0, softening=0.05, tolerance=tolerance)
         sim = simulation(
-            motes.System("stars", emit=[emitter], mass=1 / 3000), interact=[law], step=0.05
+            motes.System("stars", emit=[emitter], mass=1 / 7000), interact=[law], step=0.05
         )
         sim.run(steps=1)
         sim.run(steps=4)

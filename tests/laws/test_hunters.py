@@ -171,3 +171,17 @@ def test_several_species_feel_each_other() -> None:
     near = (np.where(geese, d, 10)[~geese] < 0.7).any(axis=1)
     assert np.linalg.norm(fled[near], axis=1).min() > 0.1
     assert fled[(np.where(geese, d, 10)[~geese] > 2.5).all(axis=1)] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("scene", "together"),
+    [
+        ("murmuration", {"starlings", "hawk"}),
+        ("fish_school", {"fish", "shark"}),
+        ("battle", {"west", "east"}),
+    ],
+)
+def test_hunters_and_prey_are_one_group(scene: str, together: set[str]) -> None:
+    """They take every stage of a step together; arrows and dust go by themselves."""
+    groups = motes.Simulation(motes.load(scene))._groups
+    assert [set(group.steppers) for group in groups] == [together]

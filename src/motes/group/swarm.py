@@ -57,7 +57,9 @@ class _Sorted:
         if key not in self.columns:
             row = self.cells.row
             real = self.cells.position.dtype
-            out = self.columns[key] = room_for(self.room, key, (row.size + LANES,), real)
+            out = self.columns[key] = room_for(
+                self.room, f"column {key}", (row.size + LANES,), real
+            )
             out[row.size :] = 0
             values, parts = self.body.column(key), blocks(row.size, ROWS)
 

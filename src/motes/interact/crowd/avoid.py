@@ -73,7 +73,7 @@ def _room(points: int, most: int, walls: int, real: Any) -> _Room:
 
 @jit(inline=True, flags=STRICT)
 def _choose(points: Any, itself: Any, limit: Any, room: Any) -> Any:
-    """Write which points are the nearest, nearest first, then of lower rows; their number."""
+    """Write which points are the nearest, nearest first, then as in cells; their number."""
     square, row, nearest = room.square, room.row, room.nearest
     most, held = nearest.size - 1, 0
     for q in range(points):
@@ -115,10 +115,13 @@ def _note(planes: Any, k: Any, nx: Any, ny: Any, c: Any) -> None:
 
 @jit(flags=STRICT)
 def _avoid(
-    cells: Any, grid: Any, velocity: Any, wanted: Any, radius: Any, walls: Any, rules: Any,
-    begin: Any, end: Any, room: Any, out: Any,
+    cells: Any, grid: Any, order: Any, velocity: Any, radius: Any, wanted: Any, walls: Any,
+    rules: Any, begin: Any, end: Any, room: Any, out: Any,
 ) -> Any:  # fmt: skip
-    """Serve agents from `begin` on; returns one without room, and the points it needs."""
+    """Serve agents from `begin` on; returns one without room, and the points it needs.
+
+    Cells, `velocity` and `radius` are in the order of cells, which `order` tells, the rest is not.
+    """
     points = np.int64(0)
     reach2 = rules.reach * rules.reach
     for t in range(begin, end):
@@ -127,7 +130,7 @@ def _avoid(
             if points > room.row.size:
                 return t, points
             collect(cells, number, room)
-        x, y, i = cells.position[0, t], cells.position[1, t], cells.row[t]
+        x, y, i = cells.position[0, t], cells.position[1, t], order[t]
         others = room.position
         square = room.square[:points]
         for q in range(square.size):
@@ -140,8 +143,8 @@ def _avoid(
         hard = walls.held[i]
         for k in range(hard):
             _note(room.planes, k, walls.plane[i, k, 0], walls.plane[i, k, 1], walls.plane[i, k, 2])
-        vx, vy, mine = np.float64(velocity[0, i]), np.float64(velocity[1, i]), np.float64(radius[i])
-        chosen = _choose(points, i, reach2, room)
+        vx, vy, mine = np.float64(velocity[0, t]), np.float64(velocity[1, t]), np.float64(radius[t])
+        chosen = _choose(points, t, reach2, room)
         for k in range(chosen):
             q = room.nearest[k]
             px, py = np.float64(others[0, q]) - x, np.float64(others[1, q]) - y
@@ -177,6 +180,9 @@ def avoid(
     points, bounds = columns(position.T, np.full(3, np.inf, real), "position")
     cut = grid(bounds, rules.reach, np.full(3, np.inf, real))
     cells = sort(points, cut)
+    order = cells.row
+    cells = cells._replace(row=np.arange(order.size, dtype=np.int32))
+    near_velocity, near_radius = velocity[:, order], radius[order]
     out = np.empty((2, position.shape[1]), real)
     parts = blocks(position.shape[1], AGENTS)
 
@@ -186,8 +192,9 @@ def avoid(
         while begin < end:
             room = _room(2 * points, nearest, walls.plane.shape[1], real)
             begin, points = _avoid(
-                cells, cut, velocity, wanted, radius, walls, rules, begin, end, room, out
-            )
+                cells, cut, order, near_velocity, near_radius, wanted, walls, rules, begin, end,
+                room, out,
+            )  # fmt: skip
 
     share(serve, len(parts))
     return out

@@ -20,7 +20,7 @@ from motes.interact.gravity.acceptance import acceptance, columns
 from motes.interact.gravity.desk import Desk, Limits
 from motes.interact.gravity.lanes import LANES, read, write
 from motes.interact.gravity.near import near_field
-from motes.interact.gravity.translations import translations
+from motes.interact.gravity.translations import Translations, translations
 from motes.interact.gravity.tree import (
     BALL_RADIUS,
     END,
@@ -36,10 +36,23 @@ from motes.interact.gravity.tree import (
     cell_unit,
 )
 from motes.jit import EXACT, jit
-from motes.machine.lanes import bits, lowest, put_some
+from motes.machine.lanes import bits, choose, lowest, put_some
 
 FULL = 16.0
 """Particles of a usual leaf, for which the limit of the error holds as it is."""
+
+
+def _expander(operations: Translations) -> Callable[..., None]:
+    """Compiled function that adds the local terms of the first LANES or fewer cells of a list."""
+    moments_to_local = operations.moments_to_local
+
+    @jit(flags=EXACT, numba=False)
+    def expand(sources: Tree, own: Any, e2: Any, far: Any, count: Any, desk: Desk) -> None:
+        for lane in range(count, LANES):
+            far[lane] = sources.cells.shape[0]
+        moments_to_local(sources.balls, far, own, sources.moments, e2, desk.gathered)
+
+    return expand  # type: ignore[no-any-return]
 
 
 @cache
@@ -55,25 +68,12 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
     sum_near = near_field(law, real, potential)
     harmonic = law != "plummer"
     operations = translations(order, harmonic)
-    moments_to_local, local_to_local = operations.moments_to_local, operations.local_to_local
+    local_to_local = operations.local_to_local
     lanes_to_local, local_to_particles = operations.lanes_to_local, operations.local_to_particles
-    easily_to_local = translations(low_order, harmonic).moments_to_local
+    expand = _expander(operations)
+    expand_easily = _expander(translations(low_order, harmonic))
     is_far = acceptance(order, low_order)
     single = real is np.float32
-
-    @jit(flags=EXACT, numba=False)
-    def expand(sources: Tree, own: Any, e2: Any, far: Any, count: Any, desk: Desk) -> None:
-        """Add the local terms of the first LANES or fewer cells of a list."""
-        for lane in range(count, LANES):
-            far[lane] = sources.cells.shape[0]
-        moments_to_local(sources.balls, far, own, sources.moments, e2, desk.gathered)
-
-    @jit(flags=EXACT, numba=False)
-    def expand_easily(sources: Tree, own: Any, e2: Any, far: Any, count: Any, desk: Desk) -> None:
-        """The same with expansions of the lower order."""
-        for lane in range(count, LANES):
-            far[lane] = sources.cells.shape[0]
-        easily_to_local(sources.balls, far, own, sources.moments, e2, desk.gathered)
 
     @jit(flags=EXACT, numba=False)
     def gather(
@@ -115,6 +115,8 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
                     low, depth = low + 1, depth + 1
                 number, depth = depth, 0
                 some = read(opened, 0)
+            valid = ascending < np.int32(number)
+            some = choose(valid, some, np.int32(0))
             write(chosen, 0, some)
             if top + LANES > candidates.size:
                 return -1
@@ -122,7 +124,6 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
                 sources.balls, chosen, own, stricter, opening2, reach, e2
             )
             start, end, _, children = columns(sources.cells, chosen)
-            valid = ascending < np.int32(number)
             inner = children > np.int32(0)
             if is_leaf:
                 separate = separate & (inner | (np.int32(end - start) > few))
