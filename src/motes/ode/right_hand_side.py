@@ -79,10 +79,15 @@ def slope(f: Function, shape: tuple[int, ...]) -> Kernel:
     if not compiled(f):
 
         def line(t, y, w, row, args):  # type: ignore[no-untyped-def]
-            w[row * size : (row + 1) * size] = f(t, y, *args)
+            value = f(t, y, *args)
+            if not hasattr(value, "__len__") or len(value) != size:
+                raise misfit(value, shape)
+            w[row * size : (row + 1) * size] = value
 
         def call(t, y, w, row, args):  # type: ignore[no-untyped-def]
             value = np.asarray(f(t, y.reshape(shape), *args))
+            if value.size != size:
+                raise misfit(value, shape)
             w[row * size : (row + 1) * size] = value.reshape(-1)
 
         return line if len(shape) == 1 else call
@@ -110,6 +115,14 @@ def slope(f: Function, shape: tuple[int, ...]) -> Kernel:
     return jit(block)
 
 
+def misfit(value: Any, shape: tuple[int, ...]) -> ValueError:
+    """What is said of a function that gives another shape than its state's."""
+    return ValueError(
+        f"the function gave {np.size(value)} numbers, shape {np.shape(value)}, for a state of "
+        f"{math.prod(shape)}, shape {shape}"
+    )
+
+
 def _slope_of_both(f: FirstOrder, size: int) -> Kernel:
     n, accelerate = size // 2, acceleration(f.acceleration, f.shape, 0)
 
@@ -126,8 +139,10 @@ def acceleration(f: Function, shape: tuple[int, ...], skip: int) -> Kernel:
     if not compiled(f):
 
         def call(t, x, v, out, args):  # type: ignore[no-untyped-def]
-            value = f(t, x.reshape(shape), v.reshape(shape), *args[skip:])
-            out[:] = np.asarray(value).reshape(-1)
+            value = np.asarray(f(t, x.reshape(shape), v.reshape(shape), *args[skip:]))
+            if value.size != x.size:
+                raise misfit(value, shape)
+            out[:] = value.reshape(-1)
 
         return call
     f = _fused(f)
