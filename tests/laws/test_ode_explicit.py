@@ -235,12 +235,9 @@ def test_senseless_arguments_are_refused(change, message):
         ode.solve(circle, [np.nan, 0.0], (0, 1))
 
 
-@pytest.mark.parametrize(
-    "wrong", [lambda t, y: (1.0, 2.0, 3.0), lambda t, y: y[0], lambda t, y: ()]
-)
-def test_a_function_of_another_shape_is_told_so(wrong: Any) -> None:
+@pytest.mark.parametrize("wrong", [lambda t, y: (1.0,) * 3, lambda t, y: y[0], lambda t, y: ()])
+def test_a_function_of_another_shape_is_told_so(wrong):
+    message = r"gave \d numbers, shape .* for a state of 2, shape \(2"
     for state in (np.ones(2), np.ones((2, 1))):
-        with pytest.raises(
-            ValueError, match=r"gave \d numbers, shape .* for a state of 2, shape \(2"
-        ):
+        with pytest.raises(ValueError, match=message):
             ode.solve(wrong, state, (0.0, 1.0), method="rk4", step=0.1)
