@@ -103,7 +103,7 @@ def particle_life(left: Any, right: Any) -> None:
     for name, share in zip(names, same, strict=True):
         colour = "0.6" if name == "white" else name
         right.plot(time, share, color=colour, label=name)
-    right.set(xlabel="time [s]", ylabel="share of neighbours of the same kind")
+    right.set(xlabel="time [s]", ylabel="neighbours of the same kind")
 
 
 PLOTS: dict[str, Callable[[Any, Any], None]] = {
@@ -117,10 +117,12 @@ PLOTS: dict[str, Callable[[Any, Any], None]] = {
 def main(names: list[str]) -> None:
     """Draw the named plots, or all."""
     for name in names or PLOTS:
-        figure, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
+        figure, axes = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
         PLOTS[name](*axes)
         for one in axes:
-            one.legend(frameon=False)
+            one.margins(y=0.05)
+            columns = 2 if len(one.get_legend_handles_labels()[1]) > 2 else 1
+            one.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=columns, frameon=False)
             one.spines[["top", "right"]].set_visible(False)
         figure.savefig(FOLDER / f"matter_{name}.png", dpi=90)
         plt.close(figure)
