@@ -6,6 +6,7 @@ own, so that neither waits for a disk or a codec.
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
@@ -38,6 +39,9 @@ STILLS = 6
 
 HELD = 1 << 28
 """Most memory of frames that wait until the first still is drawn [bytes]."""
+
+PATIENCE = 2.0
+"""Time after which a first picture is drawn, though the first still is not reached [s]."""
 
 WAITING = 3
 """Frames that may wait for the disk and the encoder; more would only use memory."""
@@ -234,13 +238,13 @@ def _draw(
 
 
 def _ahead(frames: Iterable[Frame], still: int) -> list[Frame]:
-    """The frames up to the first still, or as many as may wait in memory."""
+    """The frames up to the first still, or as many as may wait in memory and be waited for."""
     held: list[Frame] = []
-    room = HELD
+    room, late = HELD, time.monotonic() + PATIENCE
     for frame in frames:
         held.append(frame)
         room -= sum(a.nbytes for columns in frame.systems.values() for a in columns.values())
-        if frame.index >= still or room < 0:
+        if frame.index >= still or room < 0 or time.monotonic() > late:
             break
     return held
 
