@@ -51,7 +51,8 @@ def met(tree: Tree, leaf: int) -> tuple[list[int], list[int]]:
             y, mass, reach, children = parts(tree, cell)
             r2 = float(((x - y) ** 2).sum())
             q2 = (radius + reach) ** 2 / r2 if r2 else np.inf
-            if q2 < 1 and mass / r2 * q2 ** (ORDER / 2) / (1 - q2) ** 2 < ALLOWED:
+            crowd = max(radius / reach, 1) ** 4 if reach else 1
+            if q2 < 1 and mass * crowd / r2 * q2 ** (ORDER / 2) / (1 - q2) < ALLOWED:
                 far.append(cell)
             elif children and not (inner and reach < radius):
                 candidates += children
@@ -75,7 +76,7 @@ def cells() -> None:
     """What one target meets: the farther, the more particles in one cell."""
     x = disc(24_000)
     box = Box(x.min(axis=0), float(np.ptp(x, axis=0).max()), 1.0)
-    plan = Plan(order=ORDER, leaf=LEAF, real=np.float64)
+    plan = Plan(order=ORDER, low=ORDER, leaf=LEAF, real=np.float64)
     mass = np.full(len(x), 1 / len(x))
     tree = Problem.build(x, mass, None, box, "newton", 0.0, False, plan).sources
     leaves = np.flatnonzero(tree.cells[:, NUMBER] == 0)
