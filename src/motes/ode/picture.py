@@ -217,7 +217,8 @@ def _errors(axes: Axes, lengths: list[float], errors: dict[str, list[float]], pa
         if falling.size:  # Where errors change their sign the last alone says little.
             usual, last = float(np.median(falling)), float(falling[-1])
             slope = f"slope {last if abs(last - usual) < 1 else usual:.1f}"
-        slope = "exact to rounding" if good.any() and not clear.any() else slope
+        if not falling.size and (good & ~clear).any():
+            slope = "exact to rounding"
         axes.loglog(
             np.array(lengths)[good], error[good], ms=6, lw=1.4, **paint[method],
             label=f"{method}, {slope}",
