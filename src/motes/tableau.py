@@ -14,15 +14,16 @@ from itertools import pairwise
 from typing import ClassVar
 
 from motes import rooted_trees
-
-TOLERANCE = 1e-12
-"""How exactly a table must meet its order conditions, relative to the terms of their sums."""
+from motes.order_conditions import (
+    TOLERANCE,
+    TableauError,
+    check,
+    check_nystrom,
+    check_order,
+    check_sums,
+)
 
 Numbers = tuple[float, ...]
-
-
-class TableauError(ValueError):
-    """A table does not have the order that it declares."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,11 +57,11 @@ class _RungeKutta:
         s = len(self.b)
         if len(self.c) != s or len(self.a) != s:
             raise TableauError(f"{s} weights b need {s} rows a and {s} times c")
-        _check_sums(self.c, self.a)
+        check_sums(self.c, self.a)
         weight = rooted_trees.weight(self.a)
-        _check_order("", self.order, self.b, weight)
+        check_order("", self.order, self.b, weight)
         if self.b_low is not None:
-            _check_order("embedded method: ", self.low_order, self.b_low, weight)
+            check_order("embedded method: ", self.low_order, self.b_low, weight)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,12 +131,12 @@ class Explicit(_RungeKutta):
 
     def _check_dense(self) -> None:
         rows = (*self.closed, *self.a_dense)
-        _check_sums((*self.c, *([] if self.first_same_as_last else [1.0]), *self.c_dense), rows)
+        check_sums((*self.c, *([] if self.first_same_as_last else [1.0]), *self.c_dense), rows)
         weight = rooted_trees.weight(rows)
         for share in (0.25, 0.7):
             b = self.interpolant(share)
             what = f"interpolant at {share:g}: "
-            _check_order(what, max(1, self.order - 1), b, weight, share)
+            check_order(what, max(1, self.order - 1), b, weight, share)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,7 +159,7 @@ class Implicit(_RungeKutta):
     def _check_split(self) -> None:
         if any(len(row) != i for i, row in enumerate(self.a_explicit)):
             raise TableauError("row i of an explicit part has i numbers")
-        _check_sums(self.c, self.a_explicit)
+        check_sums(self.c, self.a_explicit)
         weights = rooted_trees.coloured_weights(self.a, self.a_explicit)
         parts = [("split: ", self.order, self.b)]
         if self.b_low is not None:
@@ -167,7 +168,7 @@ class Implicit(_RungeKutta):
             for tree in rooted_trees.up_to(order):
                 n, density = rooted_trees.vertices(tree), rooted_trees.density(tree)
                 for weight in weights(tree):
-                    _check(what, order, n, b, weight, 1 / density)
+                    check(what, order, n, b, weight, 1 / density)
 
     @property
     def diagonal(self) -> bool:
@@ -219,10 +220,10 @@ class Rosenbrock:
 
     def __post_init__(self) -> None:
         lower, alpha = self.plain
-        _check_sums(self.c, alpha)
-        _check_sums(self.g, lower)
-        _check_order("", self.order, _times(self.b, lower), self.weight)
-        _check_order("embedded method: ", self.low_order, _times(self.b_low, lower), self.weight)
+        check_sums(self.c, alpha)
+        check_sums(self.g, lower)
+        check_order("", self.order, _times(self.b, lower), self.weight)
+        check_order("embedded method: ", self.low_order, _times(self.b_low, lower), self.weight)
 
     @property
     def plain(self) -> tuple[list[list[float]], list[list[float]]]:
@@ -273,7 +274,7 @@ class Nystrom:
     symplectic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        _check_nystrom(self.order, self.b, self.b_position, self.weight)
+        check_nystrom(self.order, self.b, self.b_position, self.weight)
 
     @property
     def weight(self) -> rooted_trees.Weight:
@@ -310,9 +311,9 @@ class Splitting:
     def __post_init__(self) -> None:
         if len(self.kicks) != len(self.drifts) + 1:
             raise TableauError("a splitting has one kick more than drifts; the last may be 0")
-        _check("drifts: ", 1, 1, self.drifts, [1.0] * len(self.drifts), 1.0)
+        check("drifts: ", 1, 1, self.drifts, [1.0] * len(self.drifts), 1.0)
         position, velocity = self.ends
-        _check_nystrom(self.order, velocity, position, self.weight)
+        check_nystrom(self.order, velocity, position, self.weight)
 
     @property
     def weight(self) -> rooted_trees.Weight:
@@ -357,7 +358,7 @@ class BackwardDifference:
     def __post_init__(self) -> None:
         for m in range(self.order + 1):
             powers = [float((-j) ** m) for j in range(len(self.a))]
-            _check("", self.order, m, self.a, powers, float(m == 1))
+            check("", self.order, m, self.a, powers, float(m == 1))
 
 
 Table = Explicit | Splitting | Implicit | Rosenbrock | Nystrom | BackwardDifference
@@ -378,40 +379,3 @@ def composed(order: int, weights: Sequence[float]) -> Splitting:
 def _times(row: Sequence[float], matrix: Sequence[Sequence[float]]) -> list[float]:
     """A row, which may be short of trailing zeros, times a square matrix."""
     return [sum(x * matrix[m][j] for m, x in enumerate(row)) for j in range(len(matrix))]
-
-
-def _check_sums(c: Numbers, a: Sequence[Sequence[float]]) -> None:
-    for i, (time, row) in enumerate(zip(c, a, strict=True)):
-        if abs(sum(row) - time) > TOLERANCE:
-            raise TableauError(f"c[{i}] = {time:g}, but row {i} of a adds up to {sum(row):g}")
-
-
-def _check_order(
-    what: str, order: int, b: Sequence[float], weight: rooted_trees.Weight, share: float = 1.0
-) -> None:
-    """Butcher's conditions at a share of the step: sum b_i phi_i(t) = share^|t| / density(t)."""
-    for tree in rooted_trees.up_to(order):
-        n, density = rooted_trees.vertices(tree), rooted_trees.density(tree)
-        _check(what, order, n, b, weight(tree), share**n / density)
-
-
-def _check_nystrom(
-    order: int, b: Sequence[float], b_position: Sequence[float], weight: rooted_trees.Weight
-) -> None:
-    for tree in filter(rooted_trees.special, rooted_trees.up_to(order)):
-        n, density = rooted_trees.vertices(tree), rooted_trees.density(tree)
-        _check("velocity: ", order, n, b, weight(tree), 1 / density)
-        _check("position: ", order, n + 1, b_position, weight(tree), 1 / ((n + 1) * density))
-
-
-def _check(
-    what: str, declared: int, order: int, b: Sequence[float], phi: Sequence[float], target: float
-) -> None:
-    """One condition: sum b_i phi_i is the target, but for the rounding of its terms."""
-    terms = [x * y for x, y in zip(b, phi, strict=True)]
-    value, size = sum(terms), max(1.0, *map(abs, terms))
-    if order <= declared and abs(value - target) > TOLERANCE * size:
-        raise TableauError(
-            f"{what}declared order {declared}, but an order-{order} condition gives "
-            f"{value:.6g} instead of {target:.6g}"
-        )

@@ -10,7 +10,8 @@ import pytest
 from motes import rooted_trees
 from motes.integrate import method, methods
 from motes.ode.stability import error_constant
-from motes.tableau import Explicit, Implicit, Splitting, TableauError
+from motes.order_conditions import TableauError
+from motes.tableau import Explicit, Implicit, Splitting
 
 NUMBERS = ("a", "a_explicit", "b", "b_position", "c", "d", "drifts", "g", "kicks")
 
