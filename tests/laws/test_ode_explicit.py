@@ -241,3 +241,13 @@ def test_a_function_of_another_shape_is_told_so(wrong):
     for state in (np.ones(2), np.ones((2, 1))):
         with pytest.raises(ValueError, match=message):
             ode.solve(wrong, state, (0.0, 1.0), method="rk4", step=0.1)
+
+
+def test_a_compiled_function_of_another_shape_gives_no_solution():
+    @njit
+    def short(t, y):
+        return np.array([1.0])
+
+    solution = ode.solve(short, np.ones(2), (0.0, 1.0), method="rk4", step=0.1)
+    assert solution.t[-1] == 0.0
+    assert "became infinite" in solution.message

@@ -104,8 +104,12 @@ def slope(f: Function, shape: tuple[int, ...]) -> Kernel:
 
         def vector(t, y, w, row, args):  # type: ignore[no-untyped-def]
             value = f(t, y, *args)
-            for i in range(size):
-                w[row * size + i] = value[i]
+            if len(value) == size:
+                for i in range(size):
+                    w[row * size + i] = value[i]
+            else:  # Of another shape than the state: no solution, and nothing read beyond its end.
+                for i in range(size):
+                    w[row * size + i] = np.nan
 
         return jit(vector)
 
