@@ -63,13 +63,15 @@ def slabs(x: Array, reach: float, box: Array) -> tuple[Array, int]:
     """The slab (n,) of every position (3, n), and how many there are.
 
     They lie across the axis along which positions are spread most. `box`: periods, 0 along open
-    axes; positions are within it [m].
+    axes [m]; positions may have left it since they were last wrapped.
     """
     axis = int(np.argmax(np.where(box > 0, box, x.std(axis=1) * 3.5)))
     width, period = 2 * reach * (1 + 1e-6), float(box[axis])
     if period:
-        width = period / max(np.floor(period / width), 1)
-    layer = np.floor((x[axis] - x[axis].min()) / width) if not period else np.floor(x[axis] / width)
+        layers = max(np.floor(period / width), 1)
+        layer = np.floor(x[axis] * (layers / period)) % layers
+    else:
+        layer = np.floor((x[axis] - x[axis].min()) / width)
     _, layer, counts = np.unique(layer, return_inverse=True, return_counts=True)
     enough = x.shape[1] / MOST  # Neighbouring layers make one slab until they hold so many.
     begins, held = np.zeros(counts.size, np.int64), 0.0
