@@ -76,8 +76,8 @@ def pair(law: Any, way: Any, mass: float = 2.0) -> motes.Simulation:
     """Two particles in a wide periodic box, a way apart."""
     system = motes.System("atoms", mass=mass)
     scene = motes.Scene(
-        systems=[system], interact=[law], precision="double", periodic=motes.Periodic(size=(9,) * 3),
-        step=1e-6, integrator="semi_implicit_euler",
+        systems=[system], interact=[law], periodic=motes.Periodic(size=(9,) * 3), step=1e-6,
+        integrator="semi_implicit_euler", precision="double",
     )  # fmt: skip
     sim = motes.Simulation(scene)
     sim.place("atoms", np.array([[0.2, 0.1, 0.3], np.array([0.2, 0.1, 0.3]) + way]))

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from motes.interact.cells import Cells, Grid, grid, sort
 from motes.jit import STRICT, blocks, each, jit, share
 
-FINER = np.array([4.0, 1.0, 1.0])
-"""Cells per reach along each axis: what is near is in nine rows of cells along x, of which short
+FINER = 4.0
+"""Cells per reach along x: what is near is in nine rows of cells along x, of which short
 pieces are enough."""
 
 CLUSTER = 8
@@ -118,7 +118,9 @@ def common_grid(positions: list[NDArray[Any]], reach: float, periodic: Box) -> G
     low = np.where(periodic.size > 0, periodic.low - reach, low)
     high = np.where(periodic.size > 0, periodic.low + periodic.size + reach, high)
     real = positions[0].dtype if positions else np.float64
-    return grid(np.stack([low, high]).astype(float), reach / FINER, np.full(3, np.inf, real))
+    return grid(
+        np.stack([low, high]).astype(float), (reach / FINER, reach, reach), np.full(3, np.inf, real)
+    )
 
 
 @lru_cache(8)
@@ -126,7 +128,7 @@ def _closed_grid(low: tuple[float, ...], size: tuple[float, ...], reach: float, 
     """Cells of a box that repeats along all axes; wherever particles are, they are the same."""
     begin = np.array(low) - reach
     bounds = np.stack([begin, begin + np.array(size) + 2 * reach])
-    return grid(bounds, reach / FINER, np.full(3, np.inf, real))
+    return grid(bounds, (reach / FINER, reach, reach), np.full(3, np.inf, real))
 
 
 def arrange(position: NDArray[Any], cut: Grid, reach: float, periodic: Box) -> Arranged:

@@ -296,7 +296,7 @@ def particle_lists(
             room.work.append((k, cluster, near_first, near, place, first, entry))
     most, grown = _carried_out(_choose, (own, others, real(radius) ** 2, itself), room)
     if room.chosen is not None and not grown:
-        known = [part.longest for part in room.chosen.tails]
+        known = [int(part[-1]) for part in room.chosen.tails]
         if all(map(le, most, known)):
             return room.chosen
         most = list(map(max, most, known))
