@@ -49,7 +49,8 @@ def rows_wanted(key: NDArray[np.uint64]) -> int:
         begins = np.linspace(0, key.size - SAMPLE, SAMPLES).astype(int).tolist()
         some = np.concatenate([key[begin : begin + SAMPLE] for begin in begins])
     seen = 1 + ALONG * (_together(some) / max(some.size, 1) - 1)
-    return min(max(round(float(max(seen, 0.0) / ROW) ** (1 / 3)), 1), MOST_ACROSS)
+    wanted: float = (max(seen, 0.0) / ROW) ** (1 / 3)
+    return min(max(round(wanted), 1), MOST_ACROSS)
 
 
 @jit
