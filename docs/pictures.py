@@ -32,7 +32,7 @@ INSTANTS = {
     "fountain": 0.9,
     "granular": 0.65,
     "lj_melting": 0.42,
-    "lj_splash": 0.45,
+    "lj_splash": 0.67,
     "plummer": 0.1,
     "ring": 0.4,
 }
