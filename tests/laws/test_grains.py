@@ -79,6 +79,53 @@ def test_nobody_is_near_two_slabs_that_are_not_neighbours(box: np.ndarray) -> No
     assert not box.any() or many % 2 == 0
 
 
+@pytest.mark.parametrize("layers", [0.4, 1.1, 1.9, 2.2, 3.1, 4.3, 5.2])
+@pytest.mark.parametrize("alone", [0, 10**9])
+def test_narrow_boxes_that_repeat_hold_their_spheres_apart(
+    monkeypatch: pytest.MonkeyPatch, layers: float, alone: int
+) -> None:
+    """As few layers as there may be across the box: none overlap, momentum and energy stay."""
+    monkeypatch.setattr(collisions, "ALONE", alone)
+    size = 0.1
+    box = np.array([layers * 2 * size, 0.5, 0.0])
+    rng = np.random.default_rng(3)
+    x = rng.random((60, 3)) * [box[0], 0.5, 3.0]
+    v = rng.normal(size=x.shape)
+    scene = motes.Scene(
+        systems=[motes.System("grains", size=size)],
+        interact=[motes.interact.HardSpheres(restitution=1.0, friction=0.0, rest_speed=0.0,
+                                             rounds=300)],
+        periodic=motes.Periodic(size=tuple(box)), step=1e-3, integrator="semi_implicit_euler",
+        precision="double",
+    )  # fmt: skip
+    sim = motes.Simulation(scene)
+    sim.place("grains", x, v)
+    before = sim.measure()
+    sim.run(steps=30)
+    after = sim.measure()
+    assert after.momentum == pytest.approx(before.momentum, abs=1e-13)
+    assert after.kinetic == pytest.approx(before.kinetic, rel=1e-13)
+    away = sim["grains"].position[:, None] - sim["grains"].position
+    away[..., :2] -= box[:2] * np.round(away[..., :2] / box[:2])
+    length = np.sqrt((away**2).sum(axis=2))[~np.eye(60, dtype=bool)]
+    assert length.min() > size * (1 - 2e-6)
+    assert np.abs(sim["grains"].velocity - v).max() > 0.5
+
+
+def test_spheres_at_one_place_part_and_points_never_meet() -> None:
+    for size, count in ((0.1, 3), (0.0, 2)):
+        scene = motes.Scene(
+            systems=[motes.System("grains", size=size)], interact=[motes.interact.HardSpheres()],
+            step=1e-3, integrator="semi_implicit_euler", precision="double",
+        )  # fmt: skip
+        sim = motes.Simulation(scene)
+        sim.place("grains", np.zeros((count, 3)))
+        sim.run(steps=3)
+        x = sim["grains"].position
+        assert (np.diff(np.sort(x[:, 0])) >= size * (1 - 1e-6)).all()
+        assert np.abs(x.mean(axis=0)).max() < 1e-15
+
+
 def test_order_of_rows_changes_nothing_of_grains() -> None:
     """Collisions are in the order of places and ids: with rows moved, the same to the last bit."""
     x, v = heap(700)
