@@ -25,6 +25,10 @@ def put(array: Any, place: Any, value: Any) -> None:
         array[place] = value
 
 
+def streams() -> None:
+    """Say of a kernel that it goes through arrays which are too long to be in a cache."""
+
+
 def spread_over(value: Any, lanes: int) -> Any:
     """A number in every one of `lanes` (a literal)."""
     return value if lanes == 1 else np.full(lanes, value)
