@@ -31,7 +31,7 @@ INSTANTS = {
     "fireworks": 0.75,
     "fountain": 0.9,
     "granular": 0.65,
-    "lj_melting": 0.42,
+    "lj_melting": 0.3,
     "lj_splash": 0.67,
     "plummer": 0.1,
     "ring": 0.4,
