@@ -126,6 +126,23 @@ def test_spheres_at_one_place_part_and_points_never_meet() -> None:
         assert np.abs(x.mean(axis=0)).max() < 1e-15
 
 
+def test_spheres_that_overlap_move_apart_about_their_centre_of_mass() -> None:
+    """The light one by what the heavy one weighs, until they touch; in one round, on all axes."""
+    way, overlap = np.array([2.0, -1.0, 2.0]) / 3, 0.02
+    scene = motes.Scene(
+        systems=[motes.System("a", size=0.1), motes.System("b", size=0.14, mass=3.0)],
+        interact=[motes.interact.HardSpheres(rounds=1)], step=1e-3,
+        integrator="semi_implicit_euler", precision="double",
+    )  # fmt: skip
+    sim = motes.Simulation(scene)
+    sim.place("a", [[0.0, 0, 0]])
+    sim.place("b", [(0.12 - overlap) * way])
+    sim.run(steps=1)
+    assert sim["a"].position[0] == pytest.approx(-0.75 * overlap * way, abs=1e-14)
+    assert sim["b"].position[0] == pytest.approx((0.12 - 0.75 * overlap) * way, abs=1e-14)
+    assert not sim["a"].velocity.any()
+
+
 def test_order_of_rows_changes_nothing_of_grains() -> None:
     """Collisions are in the order of places and ids: with rows moved, the same to the last bit."""
     x, v = heap(700)

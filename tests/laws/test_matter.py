@@ -405,6 +405,22 @@ def test_local_order_knows_periodic_space() -> None:
     assert motes.matter.local_order(moved, size) == pytest.approx(order, abs=1e-9)
 
 
+def test_local_order_is_its_formula() -> None:
+    """1 - 14 c, c the six smallest |r_i + r_j|^2 of twelve neighbours over 2 sum |r_k|^2."""
+    crystal = lj_melt(cells=4)
+    x = crystal["atoms"].position + np.random.default_rng(2).normal(size=(256, 3)) * 0.08
+    size = np.array(crystal.scene.periodic.size)
+    order = motes.matter.local_order(x, size)
+    for k in (0, 100, 255):
+        away = x - x[k]
+        away -= size * np.round(away / size)
+        near = away[np.argsort((away**2).sum(axis=1))[1:13]]
+        sums = sorted(((a + b) ** 2).sum() for i, a in enumerate(near) for b in near[i + 1 :])
+        centrosymmetry = sum(sums[:6]) / (2 * (near**2).sum())
+        assert 0.01 < 14 * centrosymmetry < 0.9
+        assert order[k] == pytest.approx(1 - 14 * centrosymmetry, rel=1e-9)
+
+
 def test_a_ball_is_brightest_where_it_faces_the_light() -> None:
     """Lambert's law in steps: smaller, brighter dots, each nearer to the light, within the ball."""
     light = np.array([0.6, 0.0, 0.8])
