@@ -87,9 +87,10 @@ def test_narrow_boxes_that_repeat_hold_their_spheres_apart(
     """As few layers as there may be across the box: none overlap, momentum and energy stay."""
     monkeypatch.setattr(collisions, "ALONE", alone)
     size = 0.1
-    box = np.array([layers * 2 * size, 0.5, 0.0])
+    turn = [0, 1, 2] if alone else [2, 0, 1]  # Which axis is the narrow one.
+    box = np.array([layers * 2 * size, 0.5, 0.0])[turn]
     rng = np.random.default_rng(3)
-    x = rng.random((60, 3)) * [box[0], 0.5, 3.0]
+    x = rng.random((60, 3)) * np.where(box > 0, box, 3.0)
     v = rng.normal(size=x.shape)
     scene = motes.Scene(
         systems=[motes.System("grains", size=size)],
@@ -106,7 +107,8 @@ def test_narrow_boxes_that_repeat_hold_their_spheres_apart(
     assert after.momentum == pytest.approx(before.momentum, abs=1e-13)
     assert after.kinetic == pytest.approx(before.kinetic, rel=1e-13)
     away = sim["grains"].position[:, None] - sim["grains"].position
-    away[..., :2] -= box[:2] * np.round(away[..., :2] / box[:2])
+    period = np.where(box > 0, box, 1e9)
+    away -= period * np.round(away / period)
     length = np.sqrt((away**2).sum(axis=2))[~np.eye(60, dtype=bool)]
     assert length.min() > size * (1 - 2e-6)
     assert np.abs(sim["grains"].velocity - v).max() > 0.5
@@ -124,6 +126,21 @@ def test_spheres_at_one_place_part_and_points_never_meet() -> None:
         x = sim["grains"].position
         assert (np.diff(np.sort(x[:, 0])) >= size * (1 - 1e-6)).all()
         assert np.abs(x.mean(axis=0)).max() < 1e-15
+
+
+def test_slow_spheres_stop_and_friction_takes_no_more_than_the_sliding() -> None:
+    """Below the speed of rest nothing bounces; rough spheres leave each other without sliding."""
+    for speed, after in ((0.09, 0.0), (0.11, 0.5 * 0.11)):
+        law = motes.interact.HardSpheres(restitution=0.5, friction=50.0, rest_speed=0.1, rounds=1)
+        scene = motes.Scene(
+            systems=[motes.System("grains", size=0.1)], interact=[law], step=1e-4,
+            integrator="semi_implicit_euler", precision="double",
+        )  # fmt: skip
+        sim = motes.Simulation(scene)
+        sim.place("grains", [[0.0, 0, 0], [0.0999, 0, 0]], [[speed, 0, 0.07], [0, 0, 0]])
+        sim.run(steps=1)
+        u = np.diff(sim["grains"].velocity, axis=0)[0]
+        assert u == pytest.approx([after, 0, 0], abs=2e-5)  # The line of centres turns a little.
 
 
 def test_spheres_that_overlap_move_apart_about_their_centre_of_mass() -> None:
