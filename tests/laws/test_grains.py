@@ -56,7 +56,13 @@ def test_grains_depend_neither_on_threads_nor_on_how_tasks_are_shared(
 
 
 @pytest.mark.parametrize(
-    "box", [np.zeros(3), np.array([19.0, 0.0, 0.0]), np.array([2.0, 7.3, 0.0])]
+    "box",
+    [
+        np.zeros(3),
+        np.array([19.0, 0.0, 0.0]),
+        np.array([23.0, 0.0, 0.0]),
+        np.array([2.0, 7.3, 0.0]),
+    ],
 )
 def test_nobody_is_near_two_slabs_that_are_not_neighbours(box: np.ndarray) -> None:
     """All within a reach of a sphere are in its slab or in one of two others, and of a ring of
@@ -93,25 +99,28 @@ def test_narrow_boxes_that_repeat_hold_their_spheres_apart(
     x = rng.random((60, 3)) * np.where(box > 0, box, 3.0)
     v = rng.normal(size=x.shape)
     scene = motes.Scene(
-        systems=[motes.System("grains", size=size)],
+        systems=[motes.System("grains", size=size), motes.System("small", size=0.7 * size)],
         interact=[motes.interact.HardSpheres(restitution=1.0, friction=0.0, rest_speed=0.0,
                                              rounds=300)],
         periodic=motes.Periodic(size=tuple(box)), step=1e-3, integrator="semi_implicit_euler",
         precision="double",
     )  # fmt: skip
     sim = motes.Simulation(scene)
-    sim.place("grains", x, v)
+    sim.place("small", x[:30], v[:30])
+    sim.place("grains", x[30:], v[30:])
     before = sim.measure()
     sim.run(steps=30)
     after = sim.measure()
     assert after.momentum == pytest.approx(before.momentum, abs=1e-13)
     assert after.kinetic == pytest.approx(before.kinetic, rel=1e-13)
-    away = sim["grains"].position[:, None] - sim["grains"].position
+    at = np.concatenate([sim["small"].position, sim["grains"].position])
+    away = at[:, None] - at
     period = np.where(box > 0, box, 1e9)
     away -= period * np.round(away / period)
-    length = np.sqrt((away**2).sum(axis=2))[~np.eye(60, dtype=bool)]
-    assert length.min() > size * (1 - 2e-6)
-    assert np.abs(sim["grains"].velocity - v).max() > 0.5
+    length = np.sqrt((away**2).sum(axis=2))
+    half = np.repeat([0.35 * size, 0.5 * size], 30)
+    assert (length / (half[:, None] + half) + np.eye(60)).min() > 1 - 2e-6
+    assert np.abs(sim["grains"].velocity - v[30:]).max() > 0.5
 
 
 def test_spheres_at_one_place_part_and_points_never_meet() -> None:
@@ -126,6 +135,22 @@ def test_spheres_at_one_place_part_and_points_never_meet() -> None:
         x = sim["grains"].position
         assert (np.diff(np.sort(x[:, 0])) >= size * (1 - 1e-6)).all()
         assert np.abs(x.mean(axis=0)).max() < 1e-15
+
+
+def test_a_sphere_that_touches_a_solid_bounces_and_rubs() -> None:
+    """v_n becomes -e v_n, sliding loses mu (1 + e) v_n; what is slower than rest_speed stays."""
+    law = motes.interact.HardSpheres(restitution=0.6, friction=0.2, rest_speed=0.1, rounds=1)
+    scene = motes.Scene(
+        systems=[motes.System("grains", size=0.1)], interact=[law], solid=[motes.solid.Plane()],
+        step=1e-7, integrator="semi_implicit_euler", precision="double",
+    )  # fmt: skip
+    sim = motes.Simulation(scene)
+    x = np.array([[0, 0, 5e-5], [1, 0, 5e-5], [2, 0, 2e-4], [3, 0, 5e-5]])
+    v = np.array([[0.8, 0, -0.5], [0.8, 0, -0.09], [0.8, 0, -0.5], [0.05, 0, -0.5]])
+    sim.place("grains", x, v)
+    sim.run(steps=1)
+    after = [[0.8 - 0.2 * 0.8, 0, 0.3], [0.8 - 0.2 * 0.09, 0, 0], [0.8, 0, -0.5], [0, 0, 0.3]]
+    assert sim["grains"].velocity == pytest.approx(np.array(after), abs=1e-12)
 
 
 def test_slow_spheres_stop_and_friction_takes_no_more_than_the_sliding() -> None:
