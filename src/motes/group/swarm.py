@@ -14,7 +14,7 @@ from motes.compile.pairs import Law
 from motes.interact.arrange import Box
 from motes.interact.cells import Cells, Grid, sort
 from motes.interact.counting_sort import Room, room_for
-from motes.interact.runs import inside, pick, rows_of_cells, rows_wanted
+from motes.interact.runs import SHORT, inside, pick, rows_of_cells, rows_wanted
 from motes.jit import blocks, share
 
 ROWS = 1 << 15
@@ -160,6 +160,7 @@ class Swarm:
 
         def sweep(k: int) -> None:
             hold: Array = np.empty((max(kernel.sums, 3), LANES), real)
+            spots: Array = np.empty((3, LANES), real)
             room = self._room
             for source in sources:
                 slot = self._slots if source is target else nobody
@@ -168,11 +169,12 @@ class Swarm:
                 while begin < end:
                     run: Array = np.empty((room, 2), np.int64)
                     shift: Array = np.empty((room, 3), real)
+                    block: Array = np.empty((2 * room + SHORT, 2), np.int32)
                     chosen: Array = np.empty(room + LANES, np.int32)
                     begin, needed = kernel(
                         numbers, mine, slot, target.cells.key, int(target.grid.shape[0]), theirs,
-                        source.grid, source.cells, begin, end, run, shift, self._slots, chosen,
-                        hold, source is not sources[0], source is sources[-1], kept,
+                        source.grid, source.cells, begin, end, run, shift, block, self._slots, chosen,
+                        spots, hold, source is not sources[0], source is sources[-1], kept,
                         target.cells.row, push,
                     )  # fmt: skip
                     room = self._room = max(room, 2 * needed)

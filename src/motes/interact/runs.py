@@ -148,38 +148,47 @@ def runs_near(low: Any, high: Any, reach: Any, grid: Any, cells: Any, run: Any, 
     return number, points
 
 
+SHORT = 4
+"""Whole vectors of a run that are written down without asking whether it is as long."""
+
+
 @cache
 def chooser(lanes: int) -> Any:
     """A kernel that chooses points, looking at a number of them at once.
 
-    `choose(places, low, high, limit, r, number, run, shift, ramp, pick)` writes into `pick` what is
-    within reach of a box, `limit` its square, in run r and those after it that are shifted alike.
-    It returns the run after them, and how many points there are. `ramp` is 0, 1, 2, ...
+    `choose(places, spots, limit, r, number, run, shift, block, ramp, pick)` writes into `pick` what is
+    within reach of any of `spots` (3, lanes), `limit` its square, in run r and those after it that
+    are shifted alike. It returns the run after them, and how many points there are. `ramp` is
+    0, 1, 2, ...
     """
 
     @jit(inline=True)
     def choose(
-        places: Any, low: Any, high: Any, limit: Any, r: Any, number: Any, run: Any, shift: Any,
+        places: Any, spots: Any, limit: Any, r: Any, number: Any, run: Any, shift: Any, block: Any,
         ramp: Any, pick: Any,
     ) -> Any:  # fmt: skip
         dx, dy, dz = shift[r, 0], shift[r, 1], shift[r, 2]
-        west, south, floor = low[0] - dx, low[1] - dy, low[2] - dz
-        east, north, roof = high[0] - dx, high[1] - dy, high[2] - dz
-        held = 0
+        blocks = np.int64(0)
         while r < number and shift[r, 0] == dx and shift[r, 1] == dy and shift[r, 2] == dz:
             at, last = run[r, 0], run[r, 1]
-            while at < last:
-                x = take(places[0], at, lanes)
-                y = take(places[1], at, lanes)
-                z = take(places[2], at, lanes)
-                gx = x - max(min(x, east), west)
-                gy = y - max(min(y, north), south)
-                gz = z - max(min(z, roof), floor)
-                who = take(ramp, at, lanes)
-                near = (gx * gx + gy * gy + gz * gz <= limit) & (who < np.int32(last))
-                held += put_some(pick, held, who, near)
-                at += lanes
+            many = (last - at + (lanes - 1)) // lanes
+            for e in range(SHORT):
+                block[blocks + e, 0], block[blocks + e, 1] = at + e * lanes, last
+            for e in range(SHORT, many):
+                block[blocks + e, 0], block[blocks + e, 1] = at + e * lanes, last
+            blocks += many
             r += 1
+        held = 0
+        for k in range(blocks):
+            at, last = block[k, 0], block[k, 1]
+            x, y, z = take(places[0], at, lanes), take(places[1], at, lanes), take(places[2], at, lanes)
+            least = limit + limit
+            for e in range(lanes):
+                gx, gy, gz = x - (spots[0, e] - dx), y - (spots[1, e] - dy), z - (spots[2, e] - dz)
+                least = min(least, gx * gx + gy * gy + gz * gz)
+            who = take(ramp, at, lanes)
+            near = (least <= limit) & (who < np.int32(last))
+            held += put_some(pick, held, who, near)
         return r, held
 
     return choose

@@ -19,7 +19,7 @@ EACH = "motes_each"
 """Name of the function that runs the first for many packs of arguments, whose number threads take
 from a common counter."""
 
-PLAIN = "nounwind mustprogress"
+PLAIN = 'nounwind mustprogress "stackrealign"'
 
 _WORD = 8
 _HEAD = object.__basicsize__
