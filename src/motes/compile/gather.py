@@ -141,7 +141,8 @@ class Gathering:
         widest = f"max({', '.join(most)})" if len(most) > 1 else most[0]
         lines = (
             "@kernel\ndef gather(numbers, targets, slot, key, along, sources, grid, cells, "
-            "begin, end, run, shift, block, ramp, pick, spots, hold, goes_on, ends, kept, order, push):\n"
+            "begin, end, run, shift, block, ramp, pick, spots, hold, goes_on, ends, kept, order, "
+            "push):\n"
             f"{numbers}{prelude}    reach = {widest}\n"
             f"    limit, wide = reach * reach * F({1 + CAUTION}), reach * F({WIDE})\n"
         )
@@ -168,8 +169,8 @@ class Gathering:
         lines += (
             "            dx, dy, dz = shift[r, 0], shift[r, 1], shift[r, 2]\n"
             "            places = (s_x, s_y, s_z)\n"
-            "            r, held = choose(places, spots, limit, r, number, run, shift, block, ramp, "
-            "pick)\n"
+            "            r, held = choose(places, spots, limit, r, number, run, shift, block, "
+            "ramp, pick)\n"
         )
         lines += "".join(f"            o_{n} = settled(a_{n} - d{n})\n" for n in AXES)
         lines += "            for e in range(held):\n                k = pick[e]\n"

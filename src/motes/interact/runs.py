@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from motes.interact.cells import Grid, first_from, grid
 from motes.jit import STRICT, jit
-from motes.machine.lanes import put_some, take
+from motes.machine.lanes import fetch, put_some, take
 
 ALONG = 4
 """Cells along x for each reach."""
@@ -136,6 +136,8 @@ def runs_near(low: Any, high: Any, reach: Any, grid: Any, cells: Any, run: Any, 
                 begin = row + i - around_x * nx
                 a = first_from(np.uint64(begin), cells)
                 b = first_from(np.uint64(begin + end - i + 1), cells)
+                ahead = np.uint64(begin + end - i + AHEAD)
+                fetch(cells.first, ahead >> cells.shift)
                 if a < b:
                     if number < size:
                         run[number, 0], run[number, 1] = a, b
@@ -148,6 +150,9 @@ def runs_near(low: Any, high: Any, reach: Any, grid: Any, cells: Any, run: Any, 
     return number, points
 
 
+AHEAD = 16
+"""Cells beyond a run whose entry of the table is fetched for those who look up the next ones."""
+
 SHORT = 4
 """Whole vectors of a run that are written down without asking whether it is as long."""
 
@@ -156,10 +161,13 @@ SHORT = 4
 def chooser(lanes: int) -> Any:
     """A kernel that chooses points, looking at a number of them at once.
 
-    `choose(places, spots, limit, r, number, run, shift, block, ramp, pick)` writes into `pick` what is
-    within reach of any of `spots` (3, lanes), `limit` its square, in run r and those after it that
-    are shifted alike. It returns the run after them, and how many points there are. `ramp` is
-    0, 1, 2, ...
+    `choose(places, spots, limit, r, number, run, shift, block, ramp, pick)` writes into `pick` what
+    is within reach of any of `spots` (3, lanes), `limit` its square, in run r and those after it
+    that are shifted alike. It returns the run after them, and how many points there are. `block` is
+    room, `ramp` is 0, 1, 2, ...
+
+    Runs are written down as whole vectors first: a loop over few, whose number changes from run to
+    run, costs more for the guesses that the processor gets wrong than for what it does.
     """
 
     @jit(inline=True)
@@ -181,12 +189,13 @@ def chooser(lanes: int) -> Any:
         held = 0
         for k in range(blocks):
             at, last = block[k, 0], block[k, 1]
-            x, y, z = take(places[0], at, lanes), take(places[1], at, lanes), take(places[2], at, lanes)
+            x, y = take(places[0], at, lanes), take(places[1], at, lanes)
+            z, who = take(places[2], at, lanes), take(ramp, at, lanes)
             least = limit + limit
             for e in range(lanes):
-                gx, gy, gz = x - (spots[0, e] - dx), y - (spots[1, e] - dy), z - (spots[2, e] - dz)
+                gx, gy = x - (spots[0, e] - dx), y - (spots[1, e] - dy)
+                gz = z - (spots[2, e] - dz)
                 least = min(least, gx * gx + gy * gy + gz * gz)
-            who = take(ramp, at, lanes)
             near = (least <= limit) & (who < np.int32(last))
             held += put_some(pick, held, who, near)
         return r, held

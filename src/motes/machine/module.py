@@ -20,6 +20,8 @@ EACH = "motes_each"
 from a common counter."""
 
 PLAIN = 'nounwind mustprogress "stackrealign"'
+"""What holds of every function. Vectors that find no register are kept on the stack, where those
+that cross a line of the cache take longer."""
 
 _WORD = 8
 _HEAD = object.__basicsize__
