@@ -203,6 +203,42 @@ def test_langevin_holds_the_temperature_and_forgets_velocities() -> None:
     assert v.std(axis=0) == pytest.approx([spread] * 3, rel=4 / math.sqrt(2 * n))
 
 
+def shaken(
+    energy: float, friction: float, mass: float, steps: int = 1, v: Any = 0.0, moved: bool = False
+) -> Any:
+    """Velocities (n, 3) after steps of 0.05 s in a bath, in the order of ids."""
+    bath = motes.interact.Langevin(energy=energy, friction=friction)
+    scene = motes.Scene(
+        systems=[motes.System("atoms", mass=mass)], interact=[bath], step=0.05,
+        integrator="leapfrog", precision="double",
+    )  # fmt: skip
+    sim = motes.Simulation(scene)
+    sim.place("atoms", np.zeros((100_000, 3)), v)
+    if moved:
+        rows = sim._state.systems["atoms"]
+        rows.reorder(np.random.default_rng(2).permutation(rows.count).astype(np.int32))
+    sim.run(steps=steps)
+    return sim["atoms"].velocity[np.argsort(sim["atoms"].id)]
+
+
+def test_langevin_solves_its_equation_over_a_step() -> None:
+    """v = c v + sqrt((1 - c^2) k T / m) xi, c = e^(-friction h), xi normal, new on every axis."""
+    still = shaken(0.0, 2.0, 3.0, v=(3.0, -1.0, 2.0))
+    np.testing.assert_allclose(still, np.exp(-0.1) * np.tile([3.0, -1.0, 2.0], (100_000, 1)), 1e-14)
+    spread = math.sqrt((1 - math.exp(-0.2)) * 0.7 / 3.0)
+    xi = shaken(0.7, 2.0, 3.0) / spread
+    other = shaken(1.1, 0.5, 0.25) / math.sqrt((1 - math.exp(-0.05)) * 1.1 / 0.25)
+    assert other == pytest.approx(xi, rel=1e-12)
+    assert (shaken(0.7, 2.0, 3.0, moved=True) / spread == xi).all()  # It hangs on particles.
+    n = len(xi)
+    assert np.abs(xi.mean(axis=0)).max() < 4 / math.sqrt(n)
+    assert (xi**2).mean() == pytest.approx(1, abs=4 * math.sqrt(2 / (3 * n)))
+    assert (xi**4).mean() == pytest.approx(3, abs=4 * math.sqrt(96 / (3 * n)))
+    later = (shaken(0.7, 2.0, 3.0, steps=2) / spread - math.exp(-0.1) * xi)[:, 0]
+    four = np.corrcoef(np.vstack([xi.T, later]))
+    assert np.abs(four[np.triu_indices(4, 1)]).max() < 4 / math.sqrt(n)
+
+
 def test_rescale_sets_the_temperature() -> None:
     """At once, or by 1 - (1 - h/time)^k of the way; the mean velocity stays."""
     v = np.random.default_rng(1).normal(size=(500, 3)) + np.array([5.0, 0.0, 0.0])

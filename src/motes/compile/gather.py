@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 import re
-import threading
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
@@ -23,8 +22,8 @@ from motes.compile.pairs import FROM_SQUARE, Law, Writer
 from motes.compile.text import AXES, Text
 from motes.control.constant import Constant, Setting
 from motes.errors import SceneError
-from motes.interact.runs import chooser, runs_near
-from motes.jit import EXACT, STRICT, jit
+from motes.interact.runs import SHORT, chooser, runs_near
+from motes.jit import EXACT, STRICT, bound, jit
 from motes.machine.lanes import choose, fetch, put, rough_inverse_root, settled, take
 
 LANES = 8
@@ -57,7 +56,6 @@ class Gathering:
         what follows from it is computed once."""
         self._of_laws = [self._places_of(law) for law in self.laws]
         self._kernel: Callable[..., Any] | None = None
-        self._first = threading.Lock()
 
     def _places_of(self, law: Law) -> list[int]:
         """Places of a law's reach and of its numbers."""
@@ -75,35 +73,32 @@ class Gathering:
             found[places] = _values(law, time)
         return found
 
-    def __call__(self, *arguments: Any) -> Any:
-        """Add accelerations to pushes; see `_text`.
+    def bound(self, *arguments: Any) -> Callable[..., Any]:
+        """A function of a part that adds accelerations to pushes; see `_text`.
 
         Where a law's kernel is beyond what works on lanes, targets come one after another.
         """
         if self._kernel is None:
-            with self._first:
-                if self._kernel is None:
-                    return self._tried(*arguments)
-        assert self._kernel is not None
-        return self._kernel(*arguments)
+            self._kernel = self._tried(*arguments)
+        return bound(self._kernel, *arguments)
 
-    def _tried(self, *arguments: Any) -> Any:
+    def _tried(self, *arguments: Any) -> Callable[..., Any]:
+        """The kernel that compiles, tried with no targets."""
         plain = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
         kernel = self._text(1 if plain else LANES)
         try:
-            found = kernel(*arguments)
+            kernel(*arguments, 1, 0, 0, 0)
         except SceneError:
             kernel = self._text(1)
-            found = kernel(*arguments)
-        self._kernel = kernel
-        return found
+        return kernel
 
     def _text(self, lanes: int) -> Callable[..., Any]:
         """The kernel that adds what follows from the sums of all laws to the targets' pushes.
 
-        It serves targets from `begin` to `end`, and returns the first that there is not enough room
-        for, and how much it needs. Where the laws have several sources, a kernel call for each, the
-        sums are `kept` in between: a call that `goes_on` begins with them, only the last `ends`.
+        It serves targets from `begin` to `end`, with room for so many points near a few of them,
+        and writes into `state[part]` the first that there is not enough room for, and how much it
+        needs. Where the laws have several sources, a kernel call for each, the sums are `kept` in
+        between: a call that `goes_on` begins with them, only the last `ends`.
         """
         text = Text(self.laws[0].precision, self.laws[0].strict)
         prelude, body, start, keep, end, place = "", "", "", "", "", 0
@@ -195,9 +190,22 @@ class Gathering:
             "                    kept[n, i + e] = hold[n, e]\n"
             "        i = stop\n    return end, 0\n"
         )
+        lines += (
+            "@kernel\ndef gather_part(numbers, targets, slot, key, along, sources, grid, cells, "
+            "ramp, goes_on, ends, kept, order, push, state, room, part, begin, end):\n"
+            "    run, shift = empty((room, 2), int64), empty((room, 3), F)\n"
+            f"    pick = empty(room + {lanes}, int32)\n"
+            f"    block = empty((2 * room + {SHORT}, 2), int32)\n"
+            f"    spots = empty((3, {lanes}), F)\n"
+            f"    hold = empty(({max(self.sums, 3)}, {lanes}), F)\n"
+            "    state[part, 0], state[part, 1] = gather(numbers, targets, slot, key, along, "
+            "sources, grid, cells, begin, end, run, shift, block, ramp, pick, spots, hold, goes_on, "
+            "ends, kept, order, push)\n"
+        )
         text.add(lines)
         extra = {
             "int32": np.int32,
+            "int64": np.int64,
             "uint32": np.uint32,
             "uint64": np.uint64,
             "take": take,
@@ -207,8 +215,8 @@ class Gathering:
         }
         extra |= {"runs_near": runs_near, "same_row": _same_row, "bounds": _bounds}
         extra |= {"choose": chooser(lanes), "settled": settled}
-        extra["lengths"] = _lengths(text.real, text.strict)
-        found: Callable[..., Any] = text.module(extra)["gather"]
+        extra |= {"lengths": _lengths(text.real, text.strict)}
+        found: Callable[..., Any] = text.module(extra)["gather_part"]
         return found
 
 

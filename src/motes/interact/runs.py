@@ -34,9 +34,9 @@ def rows_of_cells(
     bounds: NDArray[np.float64], reach: float, across: int, box: NDArray[Any], low: NDArray[Any]
 ) -> Grid:
     """Cells of a reach [m] by `ALONG` along x and `across` along y and z, for points in bounds."""
-    width = reach / np.array([ALONG, across, across], float)
-    cut = grid(bounds, width, box)
-    return cut._replace(low=np.where(np.isfinite(box), low, cut.low))
+    cut = grid(bounds, (reach / ALONG, reach / across, reach / across), box)
+    np.copyto(cut.low, low, where=np.isfinite(box))
+    return cut
 
 
 def rows_wanted(key: NDArray[np.uint64]) -> int:
@@ -44,11 +44,23 @@ def rows_wanted(key: NDArray[np.uint64]) -> int:
 
     Where points are dense, narrow rows miss what is out of reach.
     """
-    begins = np.linspace(0, max(key.size - SAMPLE, 0), SAMPLES if key.size > SAMPLE else 1)
-    some = np.concatenate([key[int(begin) : int(begin) + SAMPLE] for begin in begins])
-    counts = np.diff(np.flatnonzero(np.diff(some)), prepend=-1, append=some.size - 1).astype(float)
-    seen = 1 + ALONG * (np.square(counts).sum() / max(some.size, 1) - 1)
-    return int(np.clip(np.round((seen / ROW) ** (1 / 3)), 1, MOST_ACROSS))
+    some = key
+    if key.size > SAMPLE:
+        begins = np.linspace(0, key.size - SAMPLE, SAMPLES).astype(int).tolist()
+        some = np.concatenate([key[begin : begin + SAMPLE] for begin in begins])
+    seen = 1 + ALONG * (_together(some) / max(some.size, 1) - 1)
+    wanted: float = (max(seen, 0.0) / ROW) ** (1 / 3)
+    return min(max(round(wanted), 1), MOST_ACROSS)
+
+
+@jit
+def _together(key: Any) -> Any:
+    """Sum of the squares of how many equal ones are next to one another."""
+    total, run = np.int64(0), np.int64(0)
+    for i in range(key.size):
+        run = run + 1 if i > 0 and key[i] == key[i - 1] else np.int64(1)
+        total += 2 * run - 1
+    return total
 
 
 @jit(flags=STRICT)
