@@ -12,24 +12,31 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.compile.pairs import Law, Writer
+from motes.compile.pairs import FROM_SQUARE, Law, Writer
 from motes.compile.text import AXES, Text
 from motes.control.constant import Constant, Setting
 from motes.errors import SceneError
-from motes.interact.runs import chooser, runs_near
-from motes.jit import bound, jit
-from motes.machine.lanes import put, settled, take
+from motes.interact.runs import SHORT, chooser, runs_near
+from motes.jit import EXACT, STRICT, bound, jit
+from motes.machine.lanes import choose, fetch, put, rough_inverse_root, settled, take
 
 LANES = 8
 """Targets that meet sources together; columns of targets go on for as many beyond the last."""
 
 CAUTION = 1e-6
 """Share of the reach's square by which rounding may move a box: more than it does."""
+
+LEAST = 1e-30
+"""Square of the least distance [m2]; those at the very same place are as far apart."""
+
+AHEAD = 8
+"""Points beyond a run that are fetched: the next targets, along the same row, are near them."""
 
 WIDE = 2.5
 """Reaches along x within which targets that meet sources together are."""
@@ -111,7 +118,7 @@ class Gathering:
                     f"                length{reach} = min(length, n{reach})\n"
                 )
             call = writer.call("near").replace("(p, ", f"(p{i}, ", 1)
-            call = call.replace("square, sqrt(square)", f"square{reach}, length{reach}")
+            call = call.replace(FROM_SQUARE, f"square{reach}, length{reach}, inverse")
             width = range(place, place + law.sums())
             place += law.sums()
             body += f"                {''.join(f'm{k}, ' for k in width)} = {call}\n"
@@ -129,7 +136,8 @@ class Gathering:
         widest = f"max({', '.join(most)})" if len(most) > 1 else most[0]
         lines = (
             "@kernel\ndef gather(numbers, targets, slot, key, along, sources, grid, cells, "
-            "begin, end, run, shift, ramp, pick, hold, goes_on, ends, kept, order, push):\n"
+            "begin, end, run, shift, block, ramp, pick, spots, hold, goes_on, ends, kept, order, "
+            "push):\n"
             f"{numbers}{prelude}    reach = {widest}\n"
             f"    limit, wide = reach * reach * F({1 + CAUTION}), reach * F({WIDE})\n"
         )
@@ -142,6 +150,13 @@ class Gathering:
             "        number, points = runs_near(low, high, reach, grid, cells, run, shift)\n"
             f"        if number > run.shape[0] or points > pick.size - {lanes}:\n"
             "            return i, max(number, points)\n"
+            "        for r in range(number):\n            k = run[r, 1] + ahead\n"
+        )
+        lines += "".join(f"            fetch(s_{n}, k)\n" for n in self.other)
+        lines += (
+            f"        for e in range({lanes}):\n"
+            "            k = i + e if i + e < stop else i\n"
+            "            spots[0, e], spots[1, e], spots[2, e] = t_x[k], t_y[k], t_z[k]\n"
             f"        me = take(slot, i, {lanes})\n"
         )
         lines += "".join(f"        a_{n} = take(t_{n}, i, {lanes})\n" for n in self.own)
@@ -149,8 +164,8 @@ class Gathering:
         lines += (
             "            dx, dy, dz = shift[r, 0], shift[r, 1], shift[r, 2]\n"
             "            places = (s_x, s_y, s_z)\n"
-            "            r, held = choose(places, low, high, limit, r, number, run, shift, ramp, "
-            "pick)\n"
+            "            r, held = choose(places, spots, limit, r, number, run, shift, block, "
+            "ramp, pick)\n"
         )
         lines += "".join(f"            o_{n} = settled(a_{n} - d{n})\n" for n in AXES)
         lines += "            for e in range(held):\n                k = pick[e]\n"
@@ -158,7 +173,7 @@ class Gathering:
         lines += (
             "                rx, ry, rz = o_x - b_x, o_y - b_y, o_z - b_z\n"
             "                square = rx * rx + ry * ry + rz * rz\n"
-            "                length = sqrt(square)\n"
+            "                length, inverse = lengths(square)\n"
             "                other = me != int32(k)\n"
         )
         lines += body
@@ -180,10 +195,12 @@ class Gathering:
             "ramp, goes_on, ends, kept, order, push, state, room, part, begin, end):\n"
             "    run, shift = empty((room, 2), int64), empty((room, 3), F)\n"
             f"    pick = empty(room + {lanes}, int32)\n"
+            f"    block = empty((2 * room + {SHORT}, 2), int32)\n"
+            f"    spots = empty((3, {lanes}), F)\n"
             f"    hold = empty(({max(self.sums, 3)}, {lanes}), F)\n"
             "    state[part, 0], state[part, 1] = gather(numbers, targets, slot, key, along, "
-            "sources, grid, cells, begin, end, run, shift, ramp, pick, hold, goes_on, ends, kept, "
-            "order, push)\n"
+            "sources, grid, cells, begin, end, run, shift, block, ramp, pick, spots, hold, goes_on, "
+            "ends, kept, order, push)\n"
         )
         text.add(lines)
         extra = {
@@ -193,9 +210,12 @@ class Gathering:
             "uint64": np.uint64,
             "take": take,
             "put": put,
+            "fetch": fetch,
+            "ahead": np.int64(AHEAD),
         }
         extra |= {"runs_near": runs_near, "same_row": _same_row, "bounds": _bounds}
         extra |= {"choose": chooser(lanes), "settled": settled}
+        extra |= {"lengths": _lengths(text.real, text.strict)}
         found: Callable[..., Any] = text.module(extra)["gather_part"]
         return found
 
@@ -208,6 +228,31 @@ def _read(laws: Sequence[Law], which: int) -> tuple[str, ...]:
 
 def _values(law: Law, time: float) -> list[float]:
     return [law.reach(time), *law.numbers(time, np.float64)]
+
+
+@cache
+def _lengths(real: type, strict: bool) -> Callable[..., Any]:
+    """Kernel: from a distance's square to the distance and 1 / distance, finite also at none.
+
+    In single precision both come from an estimate of 1 / distance, wrong by a few 1e-4, and one
+    step of Newton's method, wrong by 2e-7: a root and a division take as long as all the rest of
+    three rules of flocks.
+    """
+    least, one, half, more = real(LEAST), real(1), real(0.5), real(1.5)
+
+    @jit(inline=True, flags=EXACT)
+    def quick(square: Any) -> Any:
+        square = choose(square > least, square, least)
+        y = rough_inverse_root(square)
+        y = y * (more - (half * square) * (y * y))
+        return square * y, y
+
+    @jit(inline=True, flags=STRICT)
+    def exact(square: Any) -> Any:
+        length = np.sqrt(choose(square > least, square, least))
+        return length, one / length
+
+    return exact if strict or real is np.float64 else quick  # type: ignore[no-any-return]
 
 
 @jit(inline=True)

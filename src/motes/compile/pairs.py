@@ -30,6 +30,10 @@ FORCE, POTENTIAL, VIRIAL = "force", "potential", "virial"
 """What a pair law's loops sum up besides what a gathering law's do, `near`."""
 
 
+FROM_SQUARE = "square, sqrt(square), F(1.0) / sqrt(square + F(1e-30))"
+"""What a law reads of a distance, from its square."""
+
+
 class Law:
     """A law of limited reach: its kernels, and its numbers at a time."""
 
@@ -208,7 +212,9 @@ class Writer:
     def call(self, name: str) -> str:
         """A call of a kernel of a pair."""
         a, b = self.particle("A", self.own, "a_"), self.particle("B", self.other, "b_")
-        fields = {"x": "rx", "y": "ry", "z": "rz", "square": "square", "length": "sqrt(square)"}
+        names = ("x", "y", "z", "square", "length", "inverse")
+        way = ("rx", "ry", "rz", *FROM_SQUARE.split(", "))
+        fields = dict(zip(names, way, strict=True))
         return f"{self.translated(name)}(p, {a}, {b}, {self.text.record('R', fields)})"
 
     def translated(self, name: str) -> str:

@@ -20,7 +20,7 @@ from motes.jit import blocks, share
 ROWS = 1 << 15
 """Rows of one task of a loop that is quick."""
 
-MOST, LEAST = 1 << 13, 1 << 8
+MOST, LEAST = 1 << 15, 1 << 8
 """Targets of one task of sums."""
 
 ROOM = 512
