@@ -199,8 +199,8 @@ class Gathering:
             f"    spots = empty((3, {lanes}), F)\n"
             f"    hold = empty(({max(self.sums, 3)}, {lanes}), F)\n"
             "    state[part, 0], state[part, 1] = gather(numbers, targets, slot, key, along, "
-            "sources, grid, cells, begin, end, run, shift, block, ramp, pick, spots, hold, goes_on, "
-            "ends, kept, order, push)\n"
+            "sources, grid, cells, begin, end, run, shift, block, ramp, pick, spots, hold, "
+            "goes_on, ends, kept, order, push)\n"
         )
         text.add(lines)
         extra = {
