@@ -50,7 +50,7 @@ UP = np.array([-np.sin(np.radians(20)), 0.0, np.cos(np.radians(20))])
 
 
 def over_slope(x: Array) -> Array:
-    return ((x + (0, 0, 2.5)) @ UP)[:, None]
+    return ((x - SLOPE.position) @ UP)[:, None]
 
 
 def cruise(x: Array, v: Array) -> Array:

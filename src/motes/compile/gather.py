@@ -22,6 +22,7 @@ from motes.compile.pairs import FROM_SQUARE, Law, Writer
 from motes.compile.text import AXES, Text
 from motes.control.constant import Constant, Setting
 from motes.errors import SceneError
+from motes.interact.cells import Cells, Grid
 from motes.interact.runs import SHORT, chooser, runs_near
 from motes.jit import EXACT, STRICT, bound, jit
 from motes.machine.lanes import choose, fetch, put, rough_inverse_root, settled, take
@@ -72,6 +73,19 @@ class Gathering:
         for law, places in zip(self.laws, self._of_laws, strict=True):
             found[places] = _values(law, time)
         return found
+
+    def prepare(self, real: type) -> None:
+        """Compile, or see that the kernel cache has it, without any particles."""
+        some: NDArray[Any] = np.zeros(1, real)
+        rows, three = np.zeros(1, np.int32), np.zeros((3, 1), real)
+        whole = np.ones(3, np.int64)
+        cut = Grid(np.zeros(3), np.ones(3), whole, whole < 0, np.ones(3, real))
+        cells = Cells(three, rows, np.zeros(1, np.uint64), rows, np.uint64(0))
+        self._tried(
+            self.numbers(0.0, real), (some,) * len(self.own), rows, cells.key, 1,
+            (some,) * len(self.other), cut, cells, rows, False, True,
+            np.zeros((self.sums, 0), real), rows, three, np.zeros((1, 2), np.int64),
+        )  # fmt: skip
 
     def bound(self, *arguments: Any) -> Callable[..., Any]:
         """A function of a part that adds accelerations to pushes; see `_text`.

@@ -118,6 +118,11 @@ class Swarm:
         reach = max(law.reach(time) for law, _, _ in self.laws)
         return bool(self.periodic.shortest >= FEWEST * reach * (1 + 1e-5))
 
+    def prepare(self) -> None:
+        """Compile the laws, the last first: who needs them meanwhile begins with the first."""
+        for gathering, _, _ in reversed(self._alike):
+            gathering.prepare(self.real)
+
     def push(
         self, bodies: Mapping[str, Any], pushes: Mapping[str, Array], untidy: set[str]
     ) -> None:
