@@ -168,7 +168,7 @@ def main() -> None:
     parser.add_argument("--bpy-python", help="a Python that has Blender's wheel bpy")
     parser.add_argument("--sizes", action="store_true", help="cost per particle by count, too")
     options = parser.parse_args()
-    n, steps, rounds = (200_000, 20, 2) if options.quick else (10_000_000, 20, 6)
+    n, steps, rounds = (200_000, 20, 2) if options.quick else (10_000_000, 20, 8)
     report = Report(
         f"{n:,} particles, rk4, single precision: gravity, drag, vortex; M particle-steps/s",
         machine=machine(("taichi", "warp-lang")),
@@ -182,25 +182,34 @@ def main() -> None:
 
     grounded = "motes, ground and births"
     race(
-        2 * rounds,
+        rounds,
         {
             "bare update": bare(n),
             "motes": stepping(scene(n), steps),
-            grounded: stepping(scene(n, ground=True), 2),
+            grounded: stepping(scene(n, ground=True), steps // 5),
         },
     )
     report.ratio("motes", "bare update")
     report.ratio(grounded, "bare update")
-    for method in ("semi_implicit_euler", "rk4"):
-        plain, curved = f"{method}, {few:,}", f"{method}, two life curves"
-        smooth = scene(few, integrator=method)
-        waving = scene(few, integrator=method, curves=True)
-        race(rounds, {plain: stepping(smooth, 4 * steps), curved: stepping(waving, steps)})
-        report.ratio(curved, plain)
+    for m in (few, n):
+        for method in ("semi_implicit_euler", "rk4"):
+            plain, curved = f"{method}, {m:,}", f"{method}, {m:,}, two life curves"
+            smooth = scene(m, integrator=method)
+            waving = scene(m, integrator=method, curves=True)
+            much = n // m
+            race(
+                rounds // 2,
+                {
+                    plain: stepping(smooth, much * steps),
+                    curved: stepping(waving, much * steps // 2),
+                },
+            )
+            report.ratio(curved, plain)
     if options.sizes:
-        sizes = (n // 10, n, 10 * n)
-        tasks = {f"motes, {m:,}": stepping(scene(m), max(40 * n // m, 4)) for m in sizes}
-        race(rounds, tasks)
+        tasks = {
+            f"motes, {m:,}": stepping(scene(m), steps * max(n // m, 1)) for m in (few, n, 10 * n)
+        }
+        race(rounds // 2, tasks)
     peers(report, few, options.bpy_python)
     report.print(options.json)
 

@@ -14,6 +14,7 @@ from motes.jit import STRICT, jit
 from motes.machine.lanes import bits as marks_of
 from motes.machine.lanes import (
     choose,
+    fetch,
     largest,
     lowest,
     put,
@@ -21,6 +22,7 @@ from motes.machine.lanes import (
     rough_inverse_root,
     settled,
     spread_over,
+    streams,
     take,
     total,
 )
@@ -54,6 +56,7 @@ def test_lanes_are_numbers_side_by_side() -> None:
 
     def eight(x: Any, y: Any, out: Any, marks: Any) -> None:
         for i in range(0, x.size, 8):
+            fetch(x, i + 8)
             value, far = inner(take(x, i, 8), y[i])
             put(out, i, settled(value) + 1)
             whole = marks_of(far)
@@ -213,3 +216,22 @@ def test_a_traced_formula_does_what_it_does_with_arrays(real: Any) -> None:
     for one, other in zip(found, plain, strict=True):
         few = one[:, :3] if one.shape[0] == LANES + 4 else one
         np.testing.assert_allclose(few, other[:, :3] if few is not one else other, rtol=1e-6)
+
+
+def test_a_loop_over_long_arrays_fetches_ahead_and_does_nothing_else() -> None:
+    """A hint for each array in the SIMD loop, also past an array's end; none without the word."""
+
+    def scaled(x: Any, y: Any) -> None:
+        streams()
+        for i in range(x.size):
+            y[i] += np.float32(0.5) * x[i]
+
+    def without(x: Any, y: Any) -> None:
+        for i in range(x.size):
+            y[i] += np.float32(0.5) * x[i]
+
+    x, y = np.arange(2000, dtype=np.float32).reshape(2, 1000)
+    same(scaled, x, y)
+    hints = [compiled(f).llvm(x, y).count("call void @llvm.prefetch") for f in (scaled, without)]
+    assert hints[0] >= 2
+    assert hints[1] == 0

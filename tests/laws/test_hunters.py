@@ -157,7 +157,7 @@ def test_several_species_feel_each_other() -> None:
     d = np.sqrt((r**2).sum(axis=2)) + 10 * np.eye(240)
     kind = np.repeat([0, 1], 120)
     same = kind[:, None] == kind
-    apart = np.where(d < 1.0, (1 - d) / (d + 1e-6), 0)
+    apart = np.where(d < 1.0, (1 - d) / d, 0)
     a = 3.0 * (apart[:, :, None] * r).sum(axis=1)
     ahead = -np.einsum("ik,ijk->ij", v, r)
     seen = ahead >= np.cos(np.radians(135)) * np.linalg.norm(v, axis=1)[:, None] * d

@@ -57,20 +57,36 @@ def cloud(force: list[Any], precision: str) -> motes.Simulation:
     return simulation
 
 
+WIND = np.array([1.0, 0.0, -2.0])
+DRAGS = {
+    "even": ([motes.force.Drag(rate=0.3)], lambda v: -0.3 * v),
+    "windy": (
+        [motes.force.Drag(rate=0.3), motes.force.Drag(name="air", rate=4.0, wind=tuple(WIND))],
+        lambda v: -0.3 * v - 4.0 * (v - WIND),
+    ),
+    "uneven": (
+        [motes.force.Drag(rate=0.3), motes.force.QuadraticDrag(k=0.5)],
+        lambda v: -(0.3 + 0.5 * np.linalg.norm(v, axis=1, keepdims=True)) * v,
+    ),
+}
+"""Forces, and what they make of velocities."""
+
+
+@pytest.mark.parametrize("drag", DRAGS)
 @pytest.mark.parametrize(("precision", "rounding"), [("single", 2.0**-24), ("double", 2.0**-53)])
-def test_the_fused_step_is_the_plain_method(precision: str, rounding: float) -> None:
+def test_the_fused_step_is_the_plain_method(precision: str, rounding: float, drag: str) -> None:
     """Butcher's tableau, by whole arrays in double precision: equal but for rounding.
 
     A step adds some hundred rounded terms, which a core of 0.1 m magnifies by up to 1 / core.
     """
-    force = [motes.force.Gravity(), motes.force.Drag(rate=0.3), motes.force.Vortex(strength=2.0)]
-    simulation = cloud(force, precision)
+    drags, eased = DRAGS[drag]
+    simulation = cloud([motes.force.Gravity(), *drags, motes.force.Vortex(strength=2.0)], precision)
     view = simulation["cloud"]
     x = np.array(view.position, float)
     v = np.array(view.velocity, float)
 
     def acceleration(x: np.ndarray, v: np.ndarray) -> np.ndarray:
-        a = -0.3 * v
+        a = eased(v)
         k = 2.0 / (x[:, 0] ** 2 + x[:, 1] ** 2 + 0.1**2)
         a += np.stack([-k * x[:, 1], k * x[:, 0], np.full_like(k, -9.81)], axis=1)
         return a

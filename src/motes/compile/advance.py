@@ -69,8 +69,14 @@ class _Writer:
     def __init__(self, text: Text, motion: Motion) -> None:
         self.text, self.motion = text, motion
 
-    def _slopes(self, i: int, state: tuple[str, ...], share: float) -> str:
-        """Source for the slopes k of stage i at a state."""
+    def _slopes(
+        self, i: int, state: tuple[str, ...], share: float, row: Sequence[float] | None = None
+    ) -> str:
+        """Source for the slopes k of stage i at a state.
+
+        With a row of the table, v_i = v + h sum_j A_ij a_j, and relaxations of one rate r go in as
+        r v_i = r v + sum_j (h r A_ij) a_j: where no other force needs it, v_i is never computed.
+        """
         call = f"({', '.join(state)}, age + F({share!r}) * h, C, S{i}, L, t{i})"
         velocity = state[3:]
         lines = f"    ux{i}, uy{i}, uz{i} = carried{call}\n" if self.motion.flows else ""
@@ -83,6 +89,12 @@ class _Writer:
         if self.motion.limits:
             a = f"ax{i}, ay{i}, az{i}"
             lines += f"    {a} = limited{call[:-1]}, {a})\n"
+        if row is not None and self.motion.eases_evenly and not self.motion.limits:
+            less = [-w for w in row]
+            for axis in AXES:
+                felt = f"a{axis}{i} + b{axis} - r * v{axis}"
+                lines += f"    a{axis}{i} = {_sum(felt, less, 'h * r', axis)}\n"
+            return lines
         for axis, v in zip(AXES, velocity, strict=True):
             lines += f"    a{axis}{i} += b{axis} - r * {v}\n"
         return lines
@@ -130,7 +142,7 @@ class _Writer:
         for i, state in enumerate(stages[:-1]):
             names = tuple(f"{n}_{i}" for n in STATE)
             lines += "".join(f"    {n} = {e}\n" for n, e in zip(names, state, strict=True))
-            lines += self._slopes(i, names, method.c[i])
+            lines += self._slopes(i, names, method.c[i], method.a[i])
         self._advance(method, lines, stages[-1])
 
     def nystrom(self, method: Nystrom) -> None:

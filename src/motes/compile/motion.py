@@ -9,6 +9,7 @@ from motes.catalog import Component
 from motes.catalog.source import fields_read
 from motes.compile.surfaces import write_surfaces
 from motes.compile.text import AXES, STATE, Call, Text, packed
+from motes.control.constant import Constant, Setting
 from motes.control.control import Control
 from motes.errors import SceneError
 from motes.tableau import (
@@ -94,6 +95,20 @@ class Motion:
     def relaxes(self) -> bool:
         """Whether any force is a relaxation."""
         return any(c.kernel("relaxation") for _, c in self.forces)
+
+    @property
+    def eases_evenly(self) -> bool:
+        """Whether the sum of the relaxations' rates is one number, everywhere and at any time.
+
+        What follows from it is right in any case, and fast in this one.
+        """
+        for _, c in self.forces:
+            if (kernel := c.kernel("relaxation")) is not None:
+                read = fields_read(kernel, 1, (*STATE, *PARTICLE))
+                seen = [self.traits[name][1] for name in read if name in self.traits]
+                if read - set(self.traits) or not all(map(_fixed, (*c.values.values(), *seen))):
+                    return False
+        return self.relaxes
 
     @property
     def mortal(self) -> bool:
@@ -253,6 +268,11 @@ class _Writer:
             f"@inline\ndef dies({', '.join(STATE)}, age, C, S, L, t):\n{self._preamble()}"
             f"    return {' | '.join(f'({c})' for c in calls)}\n"
         )
+
+
+def _fixed(control: Control) -> bool:
+    """Whether a value is the same for all particles at all times."""
+    return isinstance(control, Constant | Setting)
 
 
 def _stiff(force: Component) -> bool:

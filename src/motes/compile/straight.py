@@ -74,7 +74,7 @@ def _write_step(
     stages = range(len(places))
     aged = not young and ("life" in text.values.over or "age" in motion.needs())
     outlived = young or motion.mortal
-    prelude = "    constants, offsets, splines, L = K\n    dt = end - t\n"
+    prelude = "    streams()\n    constants, offsets, splines, L = K\n    dt = end - t\n"
     if young:
         prelude += "    S, now = scene(K, t), F(end)\n"
         body = "            h, age = old[i], F(0.0)\n"

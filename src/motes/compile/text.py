@@ -26,6 +26,7 @@ from motes.jit import FAST, STRICT, jit
 from motes.kernel import ELEMENTARY
 from motes.kernel.language import Translation, can_fold
 from motes.linear import factorise, implicit_matrix, substitute
+from motes.machine.lanes import streams
 
 AXES = ("x", "y", "z")
 STATE = ("x", "y", "z", "vx", "vy", "vz")
@@ -112,6 +113,7 @@ class Text:
             "bits": np.int32 if self.precision == "single" else np.int64,
             "SIGN": np.int32(31) if self.precision == "single" else np.int64(63),
             "empty": np.empty,
+            "streams": streams,
             "implicit_matrix": implicit_matrix,
             "factorise": factorise,
             "substitute": substitute,

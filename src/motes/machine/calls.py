@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from motes.machine.ahead import MARK
 from motes.machine.block import literal
 from motes.machine.kinds import (
     BOOL,
@@ -26,6 +27,7 @@ from motes.machine.kinds import (
 from motes.machine.lanes import (
     bits,
     choose,
+    fetch,
     largest,
     lowest,
     put,
@@ -33,6 +35,7 @@ from motes.machine.lanes import (
     rough_inverse_root,
     settled,
     spread_over,
+    streams,
     take,
     total,
 )
@@ -286,6 +289,11 @@ class Calls(Many):
         self.fill(array, literal(0, array.type.item))
         return array
 
+    def streams(self) -> Value:
+        """`lanes.streams`."""
+        self.declare(MARK)
+        return Known(None)
+
     def heap(self, bytes: str) -> str:
         """Address of memory that is given back when the function returns."""
         raise NotImplementedError
@@ -375,6 +383,7 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     enumerate: Calls.numbered,
     take: Calls.take,
     put: Calls.put,
+    fetch: Calls.fetch,
     bits: Calls.bits,
     lowest: Calls.lowest,
     choose: Calls.choose,
@@ -383,6 +392,7 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     rough_inverse_root: Calls.rough_inverse_root,
     put_some: Calls.put_some,
     spread_over: Calls.spread_over,
+    streams: Calls.streams,
     settled: _intrinsic("arithmetic.fence"),
     math.fabs: _intrinsic("fabs"),
     taken_apart: Calls.taken_apart,

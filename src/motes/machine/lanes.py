@@ -25,6 +25,14 @@ def put(array: Any, place: Any, value: Any) -> None:
         array[place] = value
 
 
+def fetch(array: Any, place: Any) -> None:
+    """Say that elements of an array from a place on, or about there, are read soon."""
+
+
+def streams() -> None:
+    """Say of a kernel that it goes through arrays which are too long to be in a cache."""
+
+
 def spread_over(value: Any, lanes: int) -> Any:
     """A number in every one of `lanes` (a literal)."""
     return value if lanes == 1 else np.full(lanes, value)

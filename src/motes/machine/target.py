@@ -11,6 +11,7 @@ from typing import Any
 import llvmlite
 from llvmlite import binding
 
+from motes.machine.ahead import MARK, fetching_ahead
 from motes.machine.module import EACH, ENTRY
 
 LEVEL = 3
@@ -113,6 +114,8 @@ def optimised(text: str) -> Any:
     options.loop_unrolling = True
     builder = binding.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
+    if MARK in text:
+        module = binding.parse_assembly(fetching_ahead(str(module)), context)
     return module
 
 
