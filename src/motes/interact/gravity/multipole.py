@@ -21,7 +21,6 @@ from motes.interact.gravity.tree import (
     START,
     Box,
     Tree,
-    largest_leaf,
     octree,
     unpermute,
 )
@@ -201,7 +200,7 @@ class Problem:
         first = np.unique(np.searchsorted(branches[:, START], cuts))
         starts = branches[first[first < len(branches)], START]
         ranges = np.stack([starts, np.append(starts[1:], n)], axis=1)
-        return self._walk(ranges, len(ranges), limits)
+        return self._walk(np.array_split(ranges, len(ranges)), limits)
 
     def unsorted(self, sums: NDArray[Any]) -> NDArray[np.float64]:
         """Sums in the order in which the targets came."""
@@ -211,16 +210,14 @@ class Problem:
         share(lambda k: unpermute(sums, order, result, *ranges[k]), len(ranges))
         return result.T
 
-    def _walk(self, ranges: NDArray[np.int64], tasks: int, limits: Limits) -> NDArray[Any]:
-        """Sums at the targets in some ranges (k, 2) of rows, whole leaves, in a number of tasks."""
+    def _walk(self, parts: list[NDArray[np.int64]], limits: Limits) -> NDArray[Any]:
+        """Sums at targets, whole leaves; each part is ranges (k, 2) of rows and one task."""
         walk = walker(self.law, self.plan.real, self.potential, self.plan.order, self.plan.low)
         operations = translations(self.plan.order, self.law != "plummer")
-        same, largest, out = self.targets is self.sources, largest_leaf(self.targets), self.out
+        same, largest, out = self.targets is self.sources, self.targets.largest, self.out
         desks: SimpleQueue[Desk] = SimpleQueue()
         for _ in range(threads()):
             desks.put(desk(operations, self.plan.real, largest, 1 << 16))
-
-        parts = np.array_split(ranges, tasks)
 
         def task(number: int) -> None:
             own = desks.get()
@@ -228,12 +225,13 @@ class Problem:
                 own = desk(operations, self.plan.real, largest, 2 * own.candidates.size)
             desks.put(own)
 
-        share(task, tasks)
+        share(task, len(parts))
         return out
 
     def _at(self, sample: Sample, limits: Limits) -> NDArray[np.float64]:
-        # The largest leaves, which come first, take as long as very many others.
-        sums = self._walk(sample.ranges, len(sample.ranges), limits)
+        # The largest leaves, which come first, take longest: each task has some.
+        tasks = 4 * threads()
+        sums = self._walk([sample.ranges[k::tasks] for k in range(tasks)], limits)
         return sums[:, sample.rows].astype(np.float64)
 
     def _error(

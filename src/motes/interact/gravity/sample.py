@@ -58,7 +58,7 @@ class Sample:
     def relative(
         self, wrong: NDArray[np.float64], values: NDArray[np.float64], rounding: float
     ) -> float:
-        """Largest likely rms error in units of what is typical, without the rounding of large values.
+        """Largest likely rms error, in units of what is typical, without large values' rounding.
 
         The mean square over all is that of the sample within its standard error, which follows from
         how much leaves of one class differ.
@@ -85,18 +85,17 @@ def sample_of(tree: Tree) -> Sample:
     borders = [LEAVES << k for k in range(32) if LEAVES << k < len(leaves)]
     if borders:
         leaves = leaves[np.argpartition(-tree.bodies[leaves, RADIUS], borders)]
-    counts = cells[leaves, END] - cells[leaves, START]
     chosen, weights, chances = [], [], []
     for first, last in zip([0, *borders], [*borders, len(leaves)], strict=True):
-        number = min(LEAVES_OF_A_CLASS if first else LEAVES, last - first)
-        along = first + np.argsort(leaves[first:last])
-        some = along[(np.arange(number) * 2 + 1) * (last - first) // (2 * number)]
-        chosen.append(some)
-        weights.append(np.full(number, counts[first:last].sum() / counts[some].sum()))
-        chances.append(1 - number / (last - first))
-    picked = np.concatenate(chosen)
-    ranges: Any = cells[leaves[picked], :2].astype(np.int64)
+        some = np.sort(leaves[first:last])
+        number = min(LEAVES_OF_A_CLASS if first else LEAVES, len(some))
+        picked = some[(np.arange(number) * 2 + 1) * len(some) // (2 * number)]
+        counts = cells[picked, END] - cells[picked, START]
+        every = int((cells[some, END] - cells[some, START]).sum())
+        chosen.append(picked)
+        weights.append(np.repeat(every / counts.sum(), counts.sum()))
+        chances.append(1 - number / len(some))
+    ranges: Any = cells[np.concatenate(chosen), :2].astype(np.int64)
     rows = np.concatenate([np.arange(*r) for r in ranges])
     classes = np.cumsum([0, *map(len, chosen)])
-    weight = np.repeat(np.concatenate(weights), counts[picked])
-    return Sample(ranges, rows, weight, classes, np.array(chances))
+    return Sample(ranges, rows, np.concatenate(weights), classes, np.array(chances))

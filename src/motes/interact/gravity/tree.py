@@ -24,8 +24,9 @@ Such a leaf has a side that is near to very many small cells, in all of which it
 only, and expansions around its center hardly converge at its edge.
 """
 
-FINER = 1
-"""Levels from a usual leaf up to one that is much larger."""
+FINER, LARGER = 1, 3
+"""Levels from a usual leaf up to one that is much larger, and on to where each particle is alone:
+the ball around two of these would hold most others."""
 
 
 class Tree(NamedTuple):
@@ -37,6 +38,8 @@ class Tree(NamedTuple):
 
     leaves: NDArray[np.int32]
     """Rows of the leaves."""
+    largest: int
+    """Most particles in a leaf."""
     cells: NDArray[np.int32]
     """(cells, 4) particles START to END, and children from FIRST on, NUMBER of them."""
     bodies: NDArray[np.float64]
@@ -69,11 +72,19 @@ def _first_of(key: Any, low: Any, high: Any, shift: Any, octant: Any) -> Any:
     return low
 
 
+@jit(inline=True)
+def _most(leaf: Any, level: Any, coarse: Any) -> Any:
+    """Most particles in a leaf that fills a cube of a level."""
+    few = FEW if level + LARGER >= coarse else 1
+    return leaf if level >= coarse else few
+
+
 @jit(numba=False)
 def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
     """Write the rows of all cells; return their number, or 0 if there is no room.
 
-    Leaves have at most `leaf` particles, or FEW if they fill a cube of a level under `coarse`.
+    Leaves have at most `leaf` particles, or FEW if they fill a cube of a level under `coarse`, or
+    one if it is LARGER levels under that.
     """
     stack, cuts = np.empty((8 * LEVELS + 1, 2), np.int64), np.empty(8, np.int64)
     cells[0, START], cells[0, END] = 0, key.size
@@ -84,18 +95,18 @@ def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
         cell, level = stack[depth]
         start, end = cells[cell, START], cells[cell, END]
         cells[cell, FIRST], cells[cell, NUMBER] = count, 0
-        if end - start <= FEW:
+        if end - start == 1 or (end - start <= FEW and level + LARGER >= coarse):
             continue
         shift = np.uint64(3 * (LEVELS - 1 - level))
         while level < LEVELS and key[start] >> shift == key[end - 1] >> shift:
             level += 1
             shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
-        if level == LEVELS or (end - start <= leaf and level >= coarse):
+        if level == LEVELS or end - start <= _most(leaf, level, coarse):
             continue
         if count + 8 > cells.shape[0]:
             return 0
         # From the last octant to the first.
-        most = leaf if level + 1 >= coarse else FEW
+        most = _most(leaf, level + 1, coarse)
         high, octant, number = end, np.uint64(8), 0
         while octant > 0:
             # The widest half, quarter or octant that ends here and has few enough for a leaf.
@@ -180,7 +191,7 @@ def octree(points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int)
     )
     nothing = np.empty((0, 0))
     return Tree(
-        _leaves(cells),
+        *_leaves(cells),
         cells,
         np.empty((len(cells), 5)),
         nothing,
@@ -201,19 +212,22 @@ def _cells(key: NDArray[np.uint64], leaf: int, coarse: int) -> NDArray[np.int32]
     return cells[:count].copy()
 
 
-def _leaves(cells: NDArray[np.int32]) -> NDArray[np.int32]:
+def _leaves(cells: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
+    """Rows of the leaves, and the most particles in one."""
     found = np.empty(len(cells), np.int32)
-    return found[: _find_leaves(cells, found)]
+    count, largest = _find_leaves(cells, found)
+    return found[:count], largest
 
 
 @jit(numba=False)
 def _find_leaves(cells: Any, found: Any) -> Any:
-    count = 0
+    count, largest = 0, 0
     for cell in range(cells.shape[0]):
         if cells[cell, NUMBER] == 0:
             found[count] = cell
             count += 1
-    return count
+            largest = max(largest, cells[cell, END] - cells[cell, START])
+    return count, largest
 
 
 @jit(numba=False)
@@ -233,9 +247,3 @@ def _usual_level(key: Any, cells: Any) -> Any:
         level += 1
         below += particles[level]
     return level
-
-
-def largest_leaf(tree: Tree) -> int:
-    """Most particles in a leaf."""
-    counts = tree.cells[tree.leaves, END] - tree.cells[tree.leaves, START]
-    return int(counts.max())
