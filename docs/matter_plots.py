@@ -52,16 +52,16 @@ def splash(left: Any, right: Any) -> None:
     """Energy and height of the drop; the fluid's density over height."""
     rows = []
     sim = motes.Simulation(motes.load("lj_splash"))
-    for number, _ in enumerate(sim.frames(last=200)):
+    for number, _ in enumerate(sim.frames(last=240)):
         drop = sim["drop"]
         if number % EVERY == 0:
             kinetic = (drop.velocity.astype(float) ** 2).sum(axis=1).mean() / 2
             rows.append((sim.time, kinetic, drop.position[:, 2].mean()))
-        if number in (0, 110, 195):
+        if number in (0, 130, 235):
             height = np.concatenate([sim[name].position[:, 2] for name in ("pool", "drop")])
-            count, edges = np.histogram(height, np.arange(0, 26, 0.5))
+            count, edges = np.histogram(height, np.arange(0, 45, 0.5))
             right.plot(
-                (edges[1:] + edges[:-1]) / 2, count / (0.5 * 36**2), label=f"t = {sim.time:.1f}"
+                (edges[1:] + edges[:-1]) / 2, count / (0.5 * 72**2), label=f"t = {sim.time:.1f}"
             )
     time, kinetic, height = np.transpose(rows)
     left.plot(time, kinetic, label="kinetic energy per atom of the drop")
@@ -71,7 +71,7 @@ def splash(left: Any, right: Any) -> None:
 
 
 def granular(left: Any, right: Any) -> None:
-    """Kinetic energy of the grains, which collisions use up; heights of the layers at the end."""
+    """Kinetic energy of the grains, which collisions use up; heights of the mounds at the end."""
     sim, names, rows = motes.Simulation(motes.load("granular")), ("first", "second", "third"), []
     for number, _ in enumerate(sim.frames()):
         if number % EVERY == 0:
@@ -80,8 +80,8 @@ def granular(left: Any, right: Any) -> None:
     left.semilogy(*np.transpose(rows), label="kinetic energy per kilogram")
     left.set(xlabel="time [s]", ylabel="J/kg")
     for name in names:
-        count, edges = np.histogram(sim[name].position[:, 2], np.arange(0, 0.8, 0.03))
-        right.stairs(count, edges, label=f"{name} layer")
+        count, edges = np.histogram(sim[name].position[:, 2], np.arange(0, 1.3, 0.04))
+        right.stairs(count, edges, label=f"{name} mound")
     right.set(xlabel="height [m]", ylabel="grains")
 
 

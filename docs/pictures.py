@@ -31,8 +31,8 @@ INSTANTS = {
     "fireworks": 0.75,
     "fountain": 0.9,
     "granular": 0.65,
-    "lj_melting": 0.42,
-    "lj_splash": 0.45,
+    "lj_melting": 0.3,
+    "lj_splash": 0.67,
     "plummer": 0.1,
     "ring": 0.4,
 }

@@ -124,9 +124,10 @@ class Kernel:
             door = self.door(whole, (*arguments, *rest))
             if door is self:
                 return self.dispatcher(*arguments, *rest)
-            if PLAIN.issuperset(key):
-                known[key] = door.given(given)
-            return door(numbers)
+            if not PLAIN.issuperset(key):
+                return door(numbers)
+            call = known[key] = door.given(given)
+            return call(*rest)
 
         return bound
 

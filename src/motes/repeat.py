@@ -25,12 +25,13 @@ class Repeat:
 
     def __init__(self, kernel: Any, head: Sequence[Any], tails: Calls | Sequence[Any]) -> None:
         self.kernel, self.head, self.tails = kernel, tuple(head), tails
+        self._ids = list(map(id, self.head))
         self._known: tuple[tuple[type, ...], Callable[..., None]] | None = None
 
     def fits(self, kernel: Any, head: Sequence[Any], tails: Calls | Sequence[Any]) -> bool:
         """Whether these are its calls."""
         same = self.kernel is kernel and (self.tails is tails or self.tails == tails)
-        return same and all(map(_alike, self.head, head))
+        return same and (self._ids == list(map(id, head)) or all(map(_alike, self.head, head)))
 
     def __call__(self, *numbers: float) -> None:
         """Call with these numbers, which are always of the same types, in the middle."""

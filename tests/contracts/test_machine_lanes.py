@@ -14,6 +14,7 @@ from motes.jit import STRICT, jit
 from motes.machine.lanes import bits as marks_of
 from motes.machine.lanes import (
     choose,
+    fetch,
     largest,
     lowest,
     put,
@@ -55,6 +56,7 @@ def test_lanes_are_numbers_side_by_side() -> None:
 
     def eight(x: Any, y: Any, out: Any, marks: Any) -> None:
         for i in range(0, x.size, 8):
+            fetch(x, i + 8)
             value, far = inner(take(x, i, 8), y[i])
             put(out, i, settled(value) + 1)
             whole = marks_of(far)

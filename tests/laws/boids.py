@@ -11,7 +11,7 @@ import motes
 RULES = {
     "separation": {"radius": 0.8, "strength": 3.0},
     "alignment": {"radius": 1.5, "rate": 1.0, "angle": 100.0},
-    "cohesion": {"radius": 2.0, "strength": 2.0, "angle": 180.0},
+    "cohesion": {"radius": 2.0, "strength": 2.0, "angle": 125.0},
 }
 
 

@@ -1,5 +1,6 @@
 """Laws of the fast multipole method: its error against direct sums in double precision."""
 
+import math
 from math import factorial, prod
 
 import numpy as np
@@ -7,10 +8,14 @@ import pytest
 from test_gravity import plummer_sphere
 
 from motes import gravity
+from motes.interact.gravity.acceptance import acceptance
 from motes.interact.gravity.expansions import folded, terms
+from motes.interact.gravity.lanes import LANES, read, write
 from motes.interact.gravity.multipole import Plan, Problem
-from motes.interact.gravity.tree import NUMBER, Box, octree
+from motes.interact.gravity.tree import NUMBER, SPREAD, Box, octree
 from motes.interact.gravity.upward import summarize
+from motes.jit import jit
+from motes.machine.lanes import choose
 
 
 def distributions(n):
@@ -95,6 +100,28 @@ def test_other_targets_feel_the_same_field(tolerance):
     assert relative(phi, deep) < tolerance
 
 
+@pytest.mark.parametrize(
+    ("name", "n", "kernel", "softening", "tolerance"),
+    [
+        ("massless but few", 1000, "spline", 0.3, 1e-8),
+        ("massless but few", 1000, "plummer", 0.5, 1e-6),
+        ("one sun", 6000, "plummer", 0.5, 1e-8),
+        ("masses over 1e12", 6000, "spline", 0.3, 1e-5),
+        ("uniform", 1000, "plummer", 0.5, 1e-1),
+    ],
+)
+def test_single_large_errors_are_seen(name, n, kernel, softening, tolerance):
+    """Where the sample of leaves tells least about the others, or expansions converge slowly."""
+    x, m = distributions(n)[name]
+    options = {"softening": softening, "softening_kernel": kernel}
+    exact, deep = gravity.field(x, m, **options)
+    a, phi = gravity.field(x, m, tolerance=tolerance, method="multipole", **options)
+    assert relative(a, exact) < tolerance
+    assert relative(phi, deep) < tolerance
+    total = (m[:, None] * a).sum(axis=0)
+    assert np.abs(total).max() < tolerance * (m[:, None] * np.abs(a)).sum()
+
+
 def test_single_precision_input_keeps_its_tolerance():
     x, m = plummer_sphere(6000)
     x = x.astype(np.float32)
@@ -122,6 +149,56 @@ def test_the_error_falls_with_the_order(law, orders):
     assert errors[-1] < (1e-6 if law == "newton" else 1e-4)
 
 
+@pytest.mark.parametrize("name", ["plummer", "two clusters"])
+@pytest.mark.parametrize("order", [3, 5, 8, 11])
+def test_errors_are_the_same_part_of_what_one_expansion_may_neglect(name, order):
+    """All add up to some 0.06 to 0.25 of what one may neglect, from 0.35 to 2e-7 of the field."""
+    x, m = distributions(6000)[name]
+    exact = gravity.acceleration(x, m)
+    allowed = 5 * 10.0 ** (-(order - 1.5) / 1.3)
+    plan = Plan(order=order, low=order - 2, leaf=32, real=np.float64)
+    problem = Problem.build(x, m, None, box(x), "newton", 0.0, False, plan)
+    scale = np.sqrt((exact**2).sum(axis=1).mean())
+    sums = problem.unsorted(problem.solve(problem.limits(allowed * scale, np.inf, 0.0)))
+    ratio = relative(sums[:3].T, exact) / allowed
+    assert 0.05 < ratio < 0.3
+
+
+def far(distance, opening=1.0, reach=0.0, error=np.inf, softening=0.0, order=6):
+    """Whether a ball of radius 0.3, mass 2 and spread 0.2 is far from one of radius 0.5."""
+    own = np.array([0.1, 0.2, 0.3, 0, 0, 0, 0.5, 0.5])
+    balls, found = np.zeros((LANES, 8)), np.zeros((2, LANES))
+    balls[:, 0], balls[:, 6], balls[:, 7] = 5.0, 0.3, 0.2
+    balls[1, :3] = own[:3] + distance * np.array([2, 1, -2]) / 3
+    is_far, chosen = acceptance(order, order - 2), np.arange(LANES, dtype=np.int32)
+
+    @jit(numba=False)
+    def test(balls, chosen, mass, own, stricter, opening2, reach, e2, found):
+        full, easy, _ = is_far(balls, chosen, read(mass, 0), own, stricter, opening2, reach, e2)
+        write(found[0], 0, choose(full, 1.0, 0.0))
+        write(found[1], 0, choose(easy, 1.0, 0.0))
+
+    stricter = (1 / error, 8 / error)
+    mass = np.full(LANES, 2.0)
+    test(balls, chosen, mass, own, stricter, opening**2, reach, softening**2, found)
+    return tuple(found[:, 1] > 0)
+
+
+@pytest.mark.parametrize("off", [-1e-6, 1e-6])
+def test_cells_are_far_beyond_the_opening_the_reach_and_the_error(off):
+    yes = off > 0
+    assert far(0.8 + off)[0] == yes
+    assert far(1.6 + off, opening=0.5)[0] == yes
+    assert far(0.8 + 0.7 + off, reach=0.7)[0] == yes
+    assert far(math.sqrt(0.8**2 - 0.6**2) + off, softening=0.6)[0] == yes
+    for p, which in ((6, 0), (4, 1)):
+        for e in (0.0, 0.6):
+            r = math.sqrt(1.7**2 + e * e)
+            crowd = (0.5**2 / (0.3**2 + 0.1 * 0.5**2)) ** 2
+            error = crowd * 2 / r**2 * (0.7 / r) ** p / (1 - (0.8 / r) ** 2) * (1, 8)[which]
+            assert far(1.7, error=error * (1 + off), softening=e)[which] == yes
+
+
 @pytest.mark.parametrize("harmonic", [True, False])
 def test_moments_of_every_cell_are_the_sums_over_its_particles(harmonic):
     """M_b = sum m (-s)^b / (b! h^|b|), shifted from children to parents or summed here."""
@@ -134,6 +211,8 @@ def test_moments_of_every_cell_are_the_sums_over_its_particles(harmonic):
         np.testing.assert_allclose(center, np.average(inside, axis=0, weights=mass))
         from_center = (center - inside) / max(radius, 1e-12)
         np.testing.assert_allclose(np.linalg.norm(from_center, axis=1).max(), radius > 0)
+        spread = np.average(np.linalg.norm(center - inside, axis=1) ** 6, weights=mass) ** (1 / 6)
+        np.testing.assert_allclose(tree.balls[cell, SPREAD], spread, rtol=1e-12)
         whole = {
             b: (mass * np.prod(from_center ** np.array(b), axis=1)).sum()
             / prod(factorial(i) for i in b)

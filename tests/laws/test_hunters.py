@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -81,6 +82,23 @@ def test_the_rate_of_captures() -> None:
         assert abs(len(sim.captures) / 120 - share) < 3 * np.sqrt(share * (1 - share) / 120)
 
 
+def test_the_chance_of_a_capture() -> None:
+    """Luck below 1 - exp(-rate h) is a capture, luck above is none; many are found as few are."""
+    law = SimpleNamespace(radius=0.3, rate=4.0)
+    chance = 1 - np.exp(-4.0 * 0.05)
+    for count in (3, 200):
+        x = np.arange(3.0 * count).reshape(count, 3).T
+        cats = SimpleNamespace(name="cats", position=x, ids=np.arange(count))
+        mice = SimpleNamespace(name="mice", position=x + 0.1, ids=np.arange(count))
+        for luck, caught in ((chance - 1e-9, count), (chance + 1e-9, 0)):
+            drawn = lambda i, j, luck=luck: np.full(len(i), luck)  # noqa: E731
+            ((_, i, _, j),) = motes.interact.Capture.kernel("captures")(
+                law, [cats], [mice], drawn, 0.05
+            )
+            assert len(i) == len(j) == caught
+            assert (i == j).all()
+
+
 def test_followers_come_up_behind_their_leader() -> None:
     """A place `behind` on the leader's way, at his velocity."""
     leader = motes.System(
@@ -157,7 +175,7 @@ def test_several_species_feel_each_other() -> None:
     d = np.sqrt((r**2).sum(axis=2)) + 10 * np.eye(240)
     kind = np.repeat([0, 1], 120)
     same = kind[:, None] == kind
-    apart = np.where(d < 1.0, (1 - d) / (d + 1e-6), 0)
+    apart = np.where(d < 1.0, (1 - d) / d, 0)
     a = 3.0 * (apart[:, :, None] * r).sum(axis=1)
     ahead = -np.einsum("ik,ijk->ij", v, r)
     seen = ahead >= np.cos(np.radians(135)) * np.linalg.norm(v, axis=1)[:, None] * d

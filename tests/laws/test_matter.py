@@ -203,6 +203,42 @@ def test_langevin_holds_the_temperature_and_forgets_velocities() -> None:
     assert v.std(axis=0) == pytest.approx([spread] * 3, rel=4 / math.sqrt(2 * n))
 
 
+def shaken(
+    energy: float, friction: float, mass: float, steps: int = 1, v: Any = 0.0, moved: bool = False
+) -> Any:
+    """Velocities (n, 3) after steps of 0.05 s in a bath, in the order of ids."""
+    bath = motes.interact.Langevin(energy=energy, friction=friction)
+    scene = motes.Scene(
+        systems=[motes.System("atoms", mass=mass)], interact=[bath], step=0.05,
+        integrator="leapfrog", precision="double",
+    )  # fmt: skip
+    sim = motes.Simulation(scene)
+    sim.place("atoms", np.zeros((100_000, 3)), v)
+    if moved:
+        rows = sim._state.systems["atoms"]
+        rows.reorder(np.random.default_rng(2).permutation(rows.count).astype(np.int32))
+    sim.run(steps=steps)
+    return sim["atoms"].velocity[np.argsort(sim["atoms"].id)]
+
+
+def test_langevin_solves_its_equation_over_a_step() -> None:
+    """v = c v + sqrt((1 - c^2) k T / m) xi, c = e^(-friction h), xi normal, new on every axis."""
+    still = shaken(0.0, 2.0, 3.0, v=(3.0, -1.0, 2.0))
+    np.testing.assert_allclose(still, np.exp(-0.1) * np.tile([3.0, -1.0, 2.0], (100_000, 1)), 1e-14)
+    spread = math.sqrt((1 - math.exp(-0.2)) * 0.7 / 3.0)
+    xi = shaken(0.7, 2.0, 3.0) / spread
+    other = shaken(1.1, 0.5, 0.25) / math.sqrt((1 - math.exp(-0.05)) * 1.1 / 0.25)
+    assert other == pytest.approx(xi, rel=1e-12)
+    assert (shaken(0.7, 2.0, 3.0, moved=True) / spread == xi).all()  # It hangs on particles.
+    n = len(xi)
+    assert np.abs(xi.mean(axis=0)).max() < 4 / math.sqrt(n)
+    assert (xi**2).mean() == pytest.approx(1, abs=4 * math.sqrt(2 / (3 * n)))
+    assert (xi**4).mean() == pytest.approx(3, abs=4 * math.sqrt(96 / (3 * n)))
+    later = (shaken(0.7, 2.0, 3.0, steps=2) / spread - math.exp(-0.1) * xi)[:, 0]
+    four = np.corrcoef(np.vstack([xi.T, later]))
+    assert np.abs(four[np.triu_indices(4, 1)]).max() < 4 / math.sqrt(n)
+
+
 def test_rescale_sets_the_temperature() -> None:
     """At once, or by 1 - (1 - h/time)^k of the way; the mean velocity stays."""
     v = np.random.default_rng(1).normal(size=(500, 3)) + np.array([5.0, 0.0, 0.0])
@@ -215,6 +251,34 @@ def test_rescale_sets_the_temperature() -> None:
         after = ((now - now.mean(axis=0)) ** 2).sum() / dof
         assert after == pytest.approx(before + share * (2.5 - before), rel=1e-9)
         assert now.mean(axis=0) == pytest.approx(v.mean(axis=0), abs=1e-12)
+
+
+def test_rescale_weighs_systems_by_their_mass() -> None:
+    """Momentum stays; 2 E_kin about the mean velocity over 3 N - 3 is what was asked for."""
+    rng, mass = np.random.default_rng(4), {"light": 0.5, "heavy": 7.0}
+    scene = motes.Scene(
+        systems=[motes.System(name, mass=m) for name, m in mass.items()],
+        interact=[motes.interact.Rescale(energy=1.3)], step=0.01, integrator="leapfrog",
+        precision="double",
+    )  # fmt: skip
+    sim = motes.Simulation(scene)
+    sim.place("light", np.zeros((30, 3)), rng.normal(2.0, 1.0, (30, 3)))
+    sim.place("heavy", np.zeros((20, 3)), rng.normal(-1.0, 1.0, (20, 3)))
+    before = sim.measure().momentum
+    sim.run(steps=1)
+    assert sim.measure().momentum == pytest.approx(before, rel=1e-12, abs=1e-12)
+    mean = before / (30 * 0.5 + 20 * 7.0)
+    twice = sum(m * ((sim[name].velocity - mean) ** 2).sum() for name, m in mass.items())
+    assert twice / (3 * 50 - 3) == pytest.approx(1.3, rel=1e-12)
+
+
+def test_temperature_counts_what_can_move() -> None:
+    """2 E_kin / dof: 3 N in open space, 3 N - 3 where the total momentum is constant."""
+    x, v = np.arange(15.0).reshape(5, 3), np.random.default_rng(6).normal(size=(5, 3))
+    for size, dof in (((0, 0, 0), 15), ((0, 50.0, 0), 12), ((50.0,) * 3, 12)):
+        sim = atoms(motes.interact.LennardJones(), x, v, size=size)
+        assert motes.matter.temperature(sim) == pytest.approx((v**2).sum() / dof, rel=1e-13)
+        assert math.isnan(motes.matter.pressure(sim)) == (0 in size)
 
 
 def test_hard_spheres_bounce_with_restitution() -> None:
@@ -255,6 +319,22 @@ def test_the_radial_distribution_of_a_crystal_and_of_a_gas() -> None:
     assert (g * shell)[first].sum() == pytest.approx(12, rel=0.01)
     with pytest.raises(ValueError, match="cutoff"):
         radial_distribution(x, 10.0, 6.0)
+
+
+def test_the_radial_distribution_is_its_double_loop() -> None:
+    """g(r) = V / N^2 sum_i sum_j delta(r - r_ij) / (4 pi r^2), averaged over each bin's shell."""
+    size = np.array([4.0, 5.0, 6.0])
+    x = np.random.default_rng(7).random((60, 3)) * size
+    r, g = radial_distribution(x, size, 1.9, 19)
+    assert r == pytest.approx(0.05 + 0.1 * np.arange(19))
+    away = x[:, None] - x
+    away -= size * np.round(away / size)
+    length = np.sqrt((away**2).sum(axis=2))[~np.eye(60, dtype=bool)]
+    for k, value in enumerate(g):
+        low, high = 0.1 * k, 0.1 * (k + 1)
+        count = ((length >= low) & (length < high)).sum()
+        shell = 4 * np.pi / 3 * (high**3 - low**3)
+        assert value == pytest.approx(120.0 / 60**2 * count / shell, rel=1e-12)
 
 
 def test_faults_of_matter_are_said_in_one_line() -> None:
@@ -323,6 +403,22 @@ def test_local_order_knows_periodic_space() -> None:
     assert np.median(order) < 0.25
     moved = (shaken + np.array([1.3, 2.9, 0.4])) % np.array(size)
     assert motes.matter.local_order(moved, size) == pytest.approx(order, abs=1e-9)
+
+
+def test_local_order_is_its_formula() -> None:
+    """1 - 14 c, c the six smallest |r_i + r_j|^2 of twelve neighbours over 2 sum |r_k|^2."""
+    crystal = lj_melt(cells=4)
+    x = crystal["atoms"].position + np.random.default_rng(2).normal(size=(256, 3)) * 0.08
+    size = np.array(crystal.scene.periodic.size)
+    order = motes.matter.local_order(x, size)
+    for k in (0, 100, 255):
+        away = x - x[k]
+        away -= size * np.round(away / size)
+        near = away[np.argsort((away**2).sum(axis=1))[1:13]]
+        sums = sorted(((a + b) ** 2).sum() for i, a in enumerate(near) for b in near[i + 1 :])
+        centrosymmetry = sum(sums[:6]) / (2 * (near**2).sum())
+        assert 0.01 < 14 * centrosymmetry < 0.9
+        assert order[k] == pytest.approx(1 - 14 * centrosymmetry, rel=1e-9)
 
 
 def test_a_ball_is_brightest_where_it_faces_the_light() -> None:

@@ -24,7 +24,7 @@ def boids(
                     continue
                 w = 1 - d / rule["radius"]
                 if name == "separation":
-                    sums[name][0] += w * r / (d + 1e-6)
+                    sums[name][0] += w * r / max(d, 1e-15)
                     continue
                 angle = rule["angle"]
                 ahead = -np.dot(v[i], r)

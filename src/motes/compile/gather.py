@@ -11,26 +11,33 @@ from __future__ import annotations
 
 import os
 import re
-import threading
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.compile.pairs import Law, Writer
+from motes.compile.pairs import FROM_SQUARE, Law, Writer
 from motes.compile.text import AXES, Text
 from motes.control.constant import Constant, Setting
 from motes.errors import SceneError
-from motes.interact.runs import chooser, runs_near
-from motes.jit import jit
-from motes.machine.lanes import put, settled, take
+from motes.interact.cells import Cells, Grid
+from motes.interact.runs import SHORT, chooser, runs_near
+from motes.jit import EXACT, STRICT, bound, jit
+from motes.machine.lanes import choose, fetch, put, rough_inverse_root, settled, take
 
 LANES = 8
 """Targets that meet sources together; columns of targets go on for as many beyond the last."""
 
 CAUTION = 1e-6
 """Share of the reach's square by which rounding may move a box: more than it does."""
+
+LEAST = 1e-30
+"""Square of the least distance [m2]; those at the very same place are as far apart."""
+
+AHEAD = 8
+"""Points beyond a run that are fetched: the next targets, along the same row, are near them."""
 
 WIDE = 2.5
 """Reaches along x within which targets that meet sources together are."""
@@ -50,7 +57,6 @@ class Gathering:
         what follows from it is computed once."""
         self._of_laws = [self._places_of(law) for law in self.laws]
         self._kernel: Callable[..., Any] | None = None
-        self._first = threading.Lock()
 
     def _places_of(self, law: Law) -> list[int]:
         """Places of a law's reach and of its numbers."""
@@ -68,35 +74,45 @@ class Gathering:
             found[places] = _values(law, time)
         return found
 
-    def __call__(self, *arguments: Any) -> Any:
-        """Add accelerations to pushes; see `_text`.
+    def prepare(self, real: type) -> None:
+        """Compile, or see that the kernel cache has it, without any particles."""
+        some: NDArray[Any] = np.zeros(1, real)
+        rows, three = np.zeros(1, np.int32), np.zeros((3, 1), real)
+        whole = np.ones(3, np.int64)
+        cut = Grid(np.zeros(3), np.ones(3), whole, whole < 0, np.ones(3, real))
+        cells = Cells(three, rows, np.zeros(1, np.uint64), rows, np.uint64(0))
+        self._tried(
+            self.numbers(0.0, real), (some,) * len(self.own), rows, cells.key, 1,
+            (some,) * len(self.other), cut, cells, rows, False, True,
+            np.zeros((self.sums, 0), real), rows, three, np.zeros((1, 2), np.int64),
+        )  # fmt: skip
+
+    def bound(self, *arguments: Any) -> Callable[..., Any]:
+        """A function of a part that adds accelerations to pushes; see `_text`.
 
         Where a law's kernel is beyond what works on lanes, targets come one after another.
         """
         if self._kernel is None:
-            with self._first:
-                if self._kernel is None:
-                    return self._tried(*arguments)
-        assert self._kernel is not None
-        return self._kernel(*arguments)
+            self._kernel = self._tried(*arguments)
+        return bound(self._kernel, *arguments)
 
-    def _tried(self, *arguments: Any) -> Any:
+    def _tried(self, *arguments: Any) -> Callable[..., Any]:
+        """The kernel that compiles, tried with no targets."""
         plain = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
         kernel = self._text(1 if plain else LANES)
         try:
-            found = kernel(*arguments)
+            kernel(*arguments, 1, 0, 0, 0)
         except SceneError:
             kernel = self._text(1)
-            found = kernel(*arguments)
-        self._kernel = kernel
-        return found
+        return kernel
 
     def _text(self, lanes: int) -> Callable[..., Any]:
         """The kernel that adds what follows from the sums of all laws to the targets' pushes.
 
-        It serves targets from `begin` to `end`, and returns the first that there is not enough room
-        for, and how much it needs. Where the laws have several sources, a kernel call for each, the
-        sums are `kept` in between: a call that `goes_on` begins with them, only the last `ends`.
+        It serves targets from `begin` to `end`, with room for so many points near a few of them,
+        and writes into `state[part]` the first that there is not enough room for, and how much it
+        needs. Where the laws have several sources, a kernel call for each, the sums are `kept` in
+        between: a call that `goes_on` begins with them, only the last `ends`.
         """
         text = Text(self.laws[0].precision, self.laws[0].strict)
         prelude, body, start, keep, end, place = "", "", "", "", "", 0
@@ -116,7 +132,7 @@ class Gathering:
                     f"                length{reach} = min(length, n{reach})\n"
                 )
             call = writer.call("near").replace("(p, ", f"(p{i}, ", 1)
-            call = call.replace("square, sqrt(square)", f"square{reach}, length{reach}")
+            call = call.replace(FROM_SQUARE, f"square{reach}, length{reach}, inverse")
             width = range(place, place + law.sums())
             place += law.sums()
             body += f"                {''.join(f'm{k}, ' for k in width)} = {call}\n"
@@ -134,7 +150,8 @@ class Gathering:
         widest = f"max({', '.join(most)})" if len(most) > 1 else most[0]
         lines = (
             "@kernel\ndef gather(numbers, targets, slot, key, along, sources, grid, cells, "
-            "begin, end, run, shift, ramp, pick, hold, goes_on, ends, kept, order, push):\n"
+            "begin, end, run, shift, block, ramp, pick, spots, hold, goes_on, ends, kept, order, "
+            "push):\n"
             f"{numbers}{prelude}    reach = {widest}\n"
             f"    limit, wide = reach * reach * F({1 + CAUTION}), reach * F({WIDE})\n"
         )
@@ -147,6 +164,13 @@ class Gathering:
             "        number, points = runs_near(low, high, reach, grid, cells, run, shift)\n"
             f"        if number > run.shape[0] or points > pick.size - {lanes}:\n"
             "            return i, max(number, points)\n"
+            "        for r in range(number):\n            k = run[r, 1] + ahead\n"
+        )
+        lines += "".join(f"            fetch(s_{n}, k)\n" for n in self.other)
+        lines += (
+            f"        for e in range({lanes}):\n"
+            "            k = i + e if i + e < stop else i\n"
+            "            spots[0, e], spots[1, e], spots[2, e] = t_x[k], t_y[k], t_z[k]\n"
             f"        me = take(slot, i, {lanes})\n"
         )
         lines += "".join(f"        a_{n} = take(t_{n}, i, {lanes})\n" for n in self.own)
@@ -154,8 +178,8 @@ class Gathering:
         lines += (
             "            dx, dy, dz = shift[r, 0], shift[r, 1], shift[r, 2]\n"
             "            places = (s_x, s_y, s_z)\n"
-            "            r, held = choose(places, low, high, limit, r, number, run, shift, ramp, "
-            "pick)\n"
+            "            r, held = choose(places, spots, limit, r, number, run, shift, block, "
+            "ramp, pick)\n"
         )
         lines += "".join(f"            o_{n} = settled(a_{n} - d{n})\n" for n in AXES)
         lines += "            for e in range(held):\n                k = pick[e]\n"
@@ -163,7 +187,7 @@ class Gathering:
         lines += (
             "                rx, ry, rz = o_x - b_x, o_y - b_y, o_z - b_z\n"
             "                square = rx * rx + ry * ry + rz * rz\n"
-            "                length = sqrt(square)\n"
+            "                length, inverse = lengths(square)\n"
             "                other = me != int32(k)\n"
         )
         lines += body
@@ -180,17 +204,33 @@ class Gathering:
             "                    kept[n, i + e] = hold[n, e]\n"
             "        i = stop\n    return end, 0\n"
         )
+        lines += (
+            "@kernel\ndef gather_part(numbers, targets, slot, key, along, sources, grid, cells, "
+            "ramp, goes_on, ends, kept, order, push, state, room, part, begin, end):\n"
+            "    run, shift = empty((room, 2), int64), empty((room, 3), F)\n"
+            f"    pick = empty(room + {lanes}, int32)\n"
+            f"    block = empty((2 * room + {SHORT}, 2), int32)\n"
+            f"    spots = empty((3, {lanes}), F)\n"
+            f"    hold = empty(({max(self.sums, 3)}, {lanes}), F)\n"
+            "    state[part, 0], state[part, 1] = gather(numbers, targets, slot, key, along, "
+            "sources, grid, cells, begin, end, run, shift, block, ramp, pick, spots, hold, "
+            "goes_on, ends, kept, order, push)\n"
+        )
         text.add(lines)
         extra = {
             "int32": np.int32,
+            "int64": np.int64,
             "uint32": np.uint32,
             "uint64": np.uint64,
             "take": take,
             "put": put,
+            "fetch": fetch,
+            "ahead": np.int64(AHEAD),
         }
         extra |= {"runs_near": runs_near, "same_row": _same_row, "bounds": _bounds}
         extra |= {"choose": chooser(lanes), "settled": settled}
-        found: Callable[..., Any] = text.module(extra)["gather"]
+        extra |= {"lengths": _lengths(text.real, text.strict)}
+        found: Callable[..., Any] = text.module(extra)["gather_part"]
         return found
 
 
@@ -202,6 +242,31 @@ def _read(laws: Sequence[Law], which: int) -> tuple[str, ...]:
 
 def _values(law: Law, time: float) -> list[float]:
     return [law.reach(time), *law.numbers(time, np.float64)]
+
+
+@cache
+def _lengths(real: type, strict: bool) -> Callable[..., Any]:
+    """Kernel: from a distance's square to the distance and 1 / distance, finite also at none.
+
+    In single precision both come from an estimate of 1 / distance, wrong by a few 1e-4, and one
+    step of Newton's method, wrong by 2e-7: a root and a division take as long as all the rest of
+    three rules of flocks.
+    """
+    least, one, half, more = real(LEAST), real(1), real(0.5), real(1.5)
+
+    @jit(inline=True, flags=EXACT)
+    def quick(square: Any) -> Any:
+        square = choose(square > least, square, least)
+        y = rough_inverse_root(square)
+        y = y * (more - (half * square) * (y * y))
+        return square * y, y
+
+    @jit(inline=True, flags=STRICT)
+    def exact(square: Any) -> Any:
+        length = np.sqrt(choose(square > least, square, least))
+        return length, one / length
+
+    return exact if strict or real is np.float64 else quick  # type: ignore[no-any-return]
 
 
 @jit(inline=True)

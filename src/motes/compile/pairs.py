@@ -30,6 +30,10 @@ FORCE, POTENTIAL, VIRIAL = "force", "potential", "virial"
 """What a pair law's loops sum up besides what a gathering law's do, `near`."""
 
 
+FROM_SQUARE = "square, sqrt(square), F(1.0) / sqrt(square + F(1e-30))"
+"""What a law reads of a distance, from its square."""
+
+
 class Law:
     """A law of limited reach: its kernels, and its numbers at a time."""
 
@@ -163,9 +167,9 @@ class Law:
         return self._module[0][f"sweep_{what or self.summed}"]
 
     @property
-    def finish(self) -> Any:
-        """Kernel: from the sums to accelerations, added to pushes."""
-        return self._module[0]["finish"]
+    def pushing(self) -> Any:
+        """Kernel: the last sums of the particles of a part, and accelerations added to pushes."""
+        return self._module[0]["pushing"]
 
     @cached_property
     def _module(self) -> tuple[dict[str, Any], int]:
@@ -208,7 +212,9 @@ class Writer:
     def call(self, name: str) -> str:
         """A call of a kernel of a pair."""
         a, b = self.particle("A", self.own, "a_"), self.particle("B", self.other, "b_")
-        fields = {"x": "rx", "y": "ry", "z": "rz", "square": "square", "length": "sqrt(square)"}
+        names = ("x", "y", "z", "square", "length", "inverse")
+        way = ("rx", "ry", "rz", *FROM_SQUARE.split(", "))
+        fields = dict(zip(names, way, strict=True))
         return f"{self.translated(name)}(p, {a}, {b}, {self.text.record('R', fields)})"
 
     def translated(self, name: str) -> str:
@@ -291,7 +297,7 @@ class Writer:
         self.text.add(lines)
 
     def finish(self, width: int) -> None:
-        """The loop from sums to accelerations."""
+        """The loop from sums to accelerations, and the one that sums up and does that."""
         names, law = self.own, self.law
         lines = "@kernel\ndef finish(numbers, targets, sums, order, push, lo, hi):\n"
         lines += f"    p = {self.p()}\n"
@@ -308,6 +314,13 @@ class Writer:
         lines += "        row = order[i]\n"
         lines += "".join(f"        push[{k}, row] += f{axis}\n" for k, axis in enumerate(AXES))
         self.text.add(lines)
+        self.text.add(
+            "@kernel\ndef pushing(numbers, targets, records, sources, limit, fresh, out, order, "
+            "push, own, begin, first, entry, longest):\n"
+            f"    sweep_{law.summed}(numbers, targets, records, sources, limit, fresh, out, begin, "
+            "first, entry, longest)\n"
+            "    finish(own, targets, out, order, push, begin, begin + first.size - 1)\n"
+        )
 
 
 @jit(inline=True)

@@ -22,7 +22,6 @@ from motes.group.sums import RECORDS, Call, Packed, Places, Plan, Sums
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, arrange, common_grid, wrapped
 from motes.interact.clusters import Room, cluster_lists, particle_lists
-from motes.jit import Calls
 
 ALIKE = 1.5
 """Ratio of reaches up to which laws share lists."""
@@ -129,7 +128,7 @@ class Nearby:
         memory.lists[k] = replace(settled, settled=True)
 
     def _build(self, k: int, bodies: dict[str, Body], memory: Lasting, step: int) -> None:
-        rooms = {pair: memory.rooms.setdefault((k, *pair), []) for pair in self.classes[k].pairs}
+        rooms = {p: memory.rooms.setdefault((k, *p), Room()) for p in self.classes[k].pairs}
         memory.lists[k] = replace(self.build(self.classes[k], bodies, rooms), step=step)
         memory.builds += 1
 
@@ -151,22 +150,28 @@ class Nearby:
         arranged = {n: arrange(p, cut, radius, self.periodic) for n, p in positions.items()}
         near = {}
         for a, b in shared.pairs:
-            room = rooms[a, b] if rooms else []
+            room = rooms[a, b] if rooms else Room()
             near[a, b] = cluster_lists(arranged[a], arranged[b], cut, radius, room)
         kept = {name: _kept(bodies[name]) for name in shared.systems}
         return Lists(radius, arranged, near, kept)
 
     def _chosen(
-        self, shared: Class, found: Lists, packed: Packed, radius: float, rooms: dict[Any, Room]
+        self, shared: Class, found: Lists, packed: Packed, radius: float, rooms: dict[Any, Any]
     ) -> Lists:
         """Lists with those of particles, within a radius [m] of where they are now."""
         places = {name: packed[name][RECORDS] for name in shared.systems}
         short = {}
         for (a, b), lists in found.near.items():
-            room = rooms.setdefault((a, b), [])
-            parts = particle_lists(lists, places[a], places[b], radius, a == b, room)
-            short[a, b] = Calls(parts)
-        marks = {n: place[: found.arranged[n].order.size].copy() for n, place in places.items()}
+            room = rooms.setdefault((a, b), Room())
+            short[a, b] = particle_lists(lists, places[a], places[b], radius, a == b, room)
+        marks = {}
+        for name, place in places.items():
+            here = place[: found.arranged[name].order.size]
+            mark = rooms.get(name)
+            if mark is None or mark.shape != here.shape:
+                mark = rooms[name] = np.empty_like(here)
+            np.copyto(mark, here)
+            marks[name] = mark
         return replace(found, short=short, marks=marks, short_radius=radius)
 
     # ------------------------------------------------------------------ sums

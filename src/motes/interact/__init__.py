@@ -6,7 +6,7 @@ to which it acts, and `potential(p, a, b, r)` [J] where there is one. A gatherin
 `reach(p)`, and `acceleration(p, a, s)` [m/s2] from the sums s. Either may define `constants(p)`,
 numbers by name that follow from the parameters and join p. `a` and `b` have x y z vx vy vz and the
 columns that `needs` names; `r` is the way from b to a (to its nearest image): r.x r.y r.z,
-r.square, r.length.
+r.square, r.length, and r.inverse, 1 / length, large but finite where the length is 0.
 
 A law without a reach, such as gravity, defines `accelerations(p, bodies)`: from the positions and
 masses of all systems that take part, an array (3, n) [m/s2] for each of them; it may define

@@ -9,6 +9,7 @@ neighbours. After Páll and Hess, Computer Physics Communications 184 (2013) 264
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,8 +18,8 @@ from numpy.typing import NDArray
 from motes.interact.cells import Cells, Grid, grid, sort
 from motes.jit import STRICT, blocks, each, jit, share
 
-FINER = np.array([4.0, 1.0, 1.0])
-"""Cells per reach along each axis: what is near is in nine rows of cells along x, of which short
+FINER = 4.0
+"""Cells per reach along x: what is near is in nine rows of cells along x, of which short
 pieces are enough."""
 
 CLUSTER = 8
@@ -30,6 +31,12 @@ LARGEST_PART = 1 << 14
 
 ROWS = 1 << 15
 """Slots of one task of a loop that is quick."""
+
+TOGETHER = 1 << 9
+"""Particles that are looked through at once for some that have left the box."""
+
+FEW = 1 << 12
+"""Slots of one task of a loop that is not."""
 
 
 class Box(NamedTuple):
@@ -79,8 +86,8 @@ def wrap(position: Any, low: Any, size: Any, begin: Any, end: Any) -> None:
     """Take coordinates into [low, low + size), in place."""
     for axis in range(3):
         first, length = low[axis], size[axis]
-        if length > 0:
-            x = position[axis][begin:end]
+        for start in range(begin, end if length > 0 else begin, TOGETHER):
+            x = position[axis][start : min(start + TOGETHER, end)]
             outside = 0
             for i in range(x.size):  # Counting is vector instructions.
                 away = x[i] - first
@@ -102,13 +109,26 @@ def wrapped(position: NDArray[Any], periodic: Box, count: int | None = None) -> 
 
 def common_grid(positions: list[NDArray[Any]], reach: float, periodic: Box) -> Grid:
     """Cells for particles (3, n) within the box and their ghosts, narrower than the reach."""
+    if positions and (periodic.size > 0).all():
+        box = tuple(periodic.low.tolist()), tuple(periodic.size.tolist())
+        return _closed_grid(*box, reach, positions[0].dtype)
     inside = [p for p in positions if p.shape[1]]
     low = np.min([p.min(axis=1) for p in inside], axis=0) if inside else np.zeros(3)
     high = np.max([p.max(axis=1) for p in inside], axis=0) if inside else np.zeros(3)
     low = np.where(periodic.size > 0, periodic.low - reach, low)
     high = np.where(periodic.size > 0, periodic.low + periodic.size + reach, high)
     real = positions[0].dtype if positions else np.float64
-    return grid(np.stack([low, high]).astype(float), reach / FINER, np.full(3, np.inf, real))
+    return grid(
+        np.stack([low, high]).astype(float), (reach / FINER, reach, reach), np.full(3, np.inf, real)
+    )
+
+
+@lru_cache(8)
+def _closed_grid(low: tuple[float, ...], size: tuple[float, ...], reach: float, real: Any) -> Grid:
+    """Cells of a box that repeats along all axes; wherever particles are, they are the same."""
+    begin = np.array(low) - reach
+    bounds = np.stack([begin, begin + np.array(size) + 2 * reach])
+    return grid(bounds, (reach / FINER, reach, reach), np.full(3, np.inf, real))
 
 
 def arrange(position: NDArray[Any], cut: Grid, reach: float, periodic: Box) -> Arranged:
@@ -129,24 +149,21 @@ def _ghosts(
     position: NDArray[Any], reach: float, periodic: Box, shift: NDArray[Any]
 ) -> tuple[NDArray[Any], NDArray[np.int32], NDArray[np.uint8]]:
     """Places (3, g) of images beyond the borders, of whom they are images, and in which box."""
-    parts = blocks(position.shape[1], ROWS)
-    low, size = periodic.low, periodic.size
-    borders = np.stack([low + reach, low + size - reach])
+    size = periodic.size
+    parts = blocks(position.shape[1], FEW) if size.any() else []
+    low, high = periodic.low + reach, periodic.low + size - reach
+    border = np.where(size > 0, [low, high], [[-np.inf], [np.inf]]).astype(position.dtype)
     counts = np.zeros(len(parts) + 1, np.int64)
 
     def count(k: int) -> None:
-        counts[k + 1] = _count_images(position, borders, size, *parts[k])
+        counts[k + 1] = _count_images(position, border, *parts[k])
 
-    share(count, len(parts) if size.any() else 0)
-    ends = np.cumsum(counts)
-    place = np.empty((3, int(ends[-1])), position.dtype)
-    of, image = np.empty(place.shape[1], np.int32), np.empty(place.shape[1], np.uint8)
-    share(
-        lambda k: _write_images(
-            position, borders, size, shift, *parts[k], int(ends[k]), place, of, image
-        ),
-        len(parts) if place.size else 0,
-    )
+    share(count, len(parts))
+    ends = np.cumsum(counts).tolist()
+    place = np.empty((3, ends[-1]), position.dtype)
+    of, image = np.empty(ends[-1], np.int32), np.empty(ends[-1], np.uint8)
+    tails = [(*part, end, place, of, image) for part, end in zip(parts, ends[:-1], strict=True)]
+    each(_write_images, (position, border, shift), tails)
     return place, of, image
 
 
@@ -160,38 +177,34 @@ def _boxes(periodic: Box) -> NDArray[np.float64]:
 
 
 @jit(inline=True)
-def _sides(x: Any, border: Any, period: Any, axis: Any) -> Any:
+def _sides(x: Any, low: Any, high: Any) -> Any:
     """The first and the last of -1, 0, 1 by which a coordinate has images along an axis."""
-    if not period[axis] > 0:
-        return 0, 0
-    return (
-        -1 if x >= border[1, axis] else 0,
-        1 if x < border[0, axis] else 0,
-    )
+    return -1 if x >= high else 0, 1 if x < low else 0
 
 
 @jit(flags=STRICT)
-def _count_images(position: Any, border: Any, period: Any, begin: Any, end: Any) -> Any:
+def _count_images(position: Any, border: Any, begin: Any, end: Any) -> Any:
+    x, y, z = position[0], position[1], position[2]
+    x0, y0, z0 = border[0, 0], border[0, 1], border[0, 2]
+    x1, y1, z1 = border[1, 0], border[1, 1], border[1, 2]
     total = 0
-    for i in range(begin, end):
-        images = 1
-        for axis in range(3):
-            first, last = _sides(position[axis, i], border, period, axis)
-            images *= last - first + 1
-        total += images - 1
+    for i in range(begin, end):  # Without a branch: vector instructions.
+        images = 1 + (x[i] < x0) + (x[i] >= x1)
+        images *= 1 + (y[i] < y0) + (y[i] >= y1)
+        total += images * (1 + (z[i] < z0) + (z[i] >= z1)) - 1
     return total
 
 
 @jit(flags=STRICT)
 def _write_images(
-    position: Any, border: Any, period: Any, shift: Any, begin: Any, end: Any, new: Any,
-    place: Any, of: Any, image: Any,
+    position: Any, border: Any, shift: Any, begin: Any, end: Any, new: Any, place: Any, of: Any,
+    image: Any,
 ) -> None:  # fmt: skip
     for i in range(begin, end):
         x, y, z = position[0, i], position[1, i], position[2, i]
-        x0, x1 = _sides(x, border, period, 0)
-        y0, y1 = _sides(y, border, period, 1)
-        z0, z1 = _sides(z, border, period, 2)
+        x0, x1 = _sides(x, border[0, 0], border[1, 0])
+        y0, y1 = _sides(y, border[0, 1], border[1, 1])
+        z0, z1 = _sides(z, border[0, 2], border[1, 2])
         for a in range(x0, x1 + 1):
             for b in range(y0, y1 + 1):
                 for c in range(z0, z1 + 1):
@@ -212,21 +225,22 @@ def part_size(n: int) -> int:
 def _clusters(cells: Cells, cut: Grid, reach: float) -> list[NDArray[np.int32]]:
     n = cells.row.size
     parts = blocks(n, part_size(n))
-    rooms = [np.empty(end - begin + 1, np.int32) for begin, end in parts]
-    counts = np.zeros(len(parts), np.int64)
-    head = cells.key, cells.position[0], cut.shape[0], reach, counts
-    each(_cut, head, [(k, *part, rooms[k]) for k, part in enumerate(parts)])
-    return [room[:count] for room, count in zip(rooms, counts.tolist(), strict=True)]
+    room, counts = np.empty(n + len(parts), np.int32), np.zeros(len(parts), np.int64)
+    head = cells.key, cells.position[0], cut.shape[0], reach, counts, room
+    each(_cut, head, [(k, *part) for k, part in enumerate(parts)])
+    ends = zip(parts, counts.tolist(), strict=True)
+    return [room[begin + k : begin + k + count] for k, ((begin, _), count) in enumerate(ends)]
 
 
 @jit(flags=STRICT)
 def _cut(
-    key: Any, x: Any, along: Any, wide: Any, counts: Any, part: Any, begin: Any, end: Any,
-    first: Any,
+    key: Any, x: Any, along: Any, wide: Any, counts: Any, room: Any, part: Any, begin: Any,
+    end: Any,
 ) -> None:  # fmt: skip
     """Begin a cluster where one is full, a row of cells ends, or it would be wider than `wide`."""
     number, start, row = 0, begin, np.int64(-1)
     left = right = x.dtype.type(0)
+    first = room[begin + part :]
     for i in range(begin, end):
         own = np.int64(key[i]) // along
         if number:

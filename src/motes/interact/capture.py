@@ -12,6 +12,9 @@ from motes.catalog import Number, component, quantity
 if TYPE_CHECKING:
     from motes.group.capture import Animals
 
+FEW = 1 << 14
+"""Pairs that are looked at one by one."""
+
 
 @component
 class Capture:
@@ -56,7 +59,11 @@ def _nearest(hunters: Any, prey: Any, radius: float) -> tuple[Any, Any]:
     around = np.flatnonzero(((low <= prey.T) & (high >= prey.T)).all(axis=1))
     if not around.size:
         return nobody, nobody
-    i, found = within(prey[:, around].T, radius, targets=hunters.T)
+    if hunters.shape[1] * around.size <= FEW:
+        way = hunters[:, :, None] - prey[:, None, around]
+        i, found = np.nonzero((way * way).sum(axis=0) <= radius * radius)
+    else:
+        i, found = within(prey[:, around].T, radius, targets=hunters.T)
     j = around[found]
     order = np.lexsort((j, np.square(hunters[:, i] - prey[:, j]).sum(axis=0), i))
     first = order[np.unique(i[order], return_index=True)[1]]

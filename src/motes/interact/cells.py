@@ -11,6 +11,7 @@ cells than points the table has an entry per cell, and nothing is left to halve.
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +28,12 @@ MOST_RUNS = 18
 
 _ALONG = 1 << 20
 """Most cells along an axis: the numbers of three fit into 60 bits."""
+
+_ROUNDING = {c: 4 * float(np.finfo(c).eps) for c in "efdg"}
+"""What rounding can move a distance by, over the box, by type of numbers."""
+
+_FARTHEST = float(np.finfo(np.float64).max) / 2
+"""Cells, counted from 0, up to which a coordinate has a cell."""
 
 _ENTRIES = 4
 """Most entries of the table per point."""
@@ -138,7 +145,7 @@ def columns(
 
 
 def grid(
-    bounds: NDArray[np.float64], radius: float | NDArray[np.float64], box: NDArray[Any]
+    bounds: NDArray[np.float64], radius: float | tuple[float, float, float], box: NDArray[Any]
 ) -> Grid:
     """Cells for a search within `radius` [m] of points within `bounds` (2, 3) [m].
 
@@ -149,21 +156,27 @@ def grid(
     cells is folded: parts far from each other share cells, and distances tell them apart. Cells
     then begin at 0 and are as wide as a power of 2, so that no coordinate is too large for them.
     """
-    periodic = np.isfinite(box)
-    period = np.where(periodic, box, 0.0).astype(float)
-    width = radius * (1 + 2.0**-20) + 4 * float(np.finfo(box.dtype).eps) * period
-    extent = np.where(periodic, period, bounds[1] - bounds[0])
-    shape = np.floor(np.minimum(extent / width, _ALONG)).astype(np.int64)
-    shape = np.clip(np.where(periodic, shape, shape + 1), 1, _ALONG)
-    folded = ~periodic & (shape == _ALONG)
-    scale = np.where(folded, 2.0 ** np.floor(-np.log2(width)), 1 / width)
-    scale[periodic] = shape[periodic] / period[periodic]
-    low = np.where(periodic | folded, 0.0, bounds[0])
-    with np.errstate(over="ignore"):
-        farthest = np.max(np.abs(bounds) * scale)
-    if farthest > np.finfo(np.float64).max / 2:
-        raise ValueError(f"radius = {radius} m is too small for points {extent.max():.3g} m apart")
-    return Grid(low, scale, shape, periodic | folded, box)
+    rounding = _ROUNDING[box.dtype.char]
+    ends = bounds.tolist()
+    widths = radius if isinstance(radius, tuple) else (radius,) * 3
+    low, scale, shape, wraps = np.zeros(3), np.empty(3), np.empty(3, np.int64), np.empty(3, bool)
+    for axis, edge in enumerate(box.tolist()):  # Three numbers: Python is quicker than NumPy.
+        begin, end = ends[0][axis], ends[1][axis]
+        periodic = math.isfinite(edge)
+        period = edge if periodic else 0.0
+        width = widths[axis] * (1 + 2.0**-20) + rounding * period
+        count = int(min((period if periodic else end - begin) / width, _ALONG))
+        count = min(max(count if periodic else count + 1, 1), _ALONG)
+        folded = not periodic and count == _ALONG
+        each = 2.0 ** math.floor(-math.log2(width)) if folded else 1 / width
+        each = count / period if periodic else each
+        if max(abs(begin), abs(end)) * each > _FARTHEST:
+            raise ValueError(
+                f"radius = {radius} m is too small for points {end - begin:.3g} m apart"
+            )
+        low[axis] = 0.0 if periodic or folded else begin
+        scale[axis], shape[axis], wraps[axis] = each, count, periodic or folded
+    return Grid(low, scale, shape, wraps, box)
 
 
 @jit(flags=STRICT)
@@ -203,6 +216,19 @@ def _index(key: Any, begin: Any, shift: Any, last: Any, first: Any) -> None:
         first[entry:] = begin + key.size - skipped
 
 
+def keys(position: NDArray[Any], grid: Grid, room: Room | None = None) -> NDArray[np.uint64]:
+    """Numbers of the points' cells (n,)."""
+    n = position.shape[1]
+    parts, key = blocks(n, ROWS), room_for(room, "key", (n,), np.uint64)
+
+    def write(part: int) -> None:
+        rows = slice(*parts[part])
+        _write_keys(position[:, rows], grid, key[rows])
+
+    share(write, len(parts))
+    return key
+
+
 def sort(position: NDArray[Any], grid: Grid, spare: int = 0, room: Room | None = None) -> Cells:
     """The points (3, n) in the order of (cell, row), with room for some more behind them.
 
@@ -210,13 +236,7 @@ def sort(position: NDArray[Any], grid: Grid, spare: int = 0, room: Room | None =
     """
     n = position.shape[1]
     parts = blocks(n, ROWS)
-    key = room_for(room, "key", (n,), np.uint64)
-
-    def write(part: int) -> None:
-        rows = slice(*parts[part])
-        _write_keys(position[:, rows], grid, key[rows])
-
-    share(write, len(parts))
+    key = keys(position, grid, room)
     total = int(np.prod(grid.shape, dtype=object))
     bits = (total - 1).bit_length()
     ordered = room_for(room, "ordered", (3, n + spare), position.dtype)

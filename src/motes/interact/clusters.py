@@ -10,6 +10,8 @@ Computer Physics Communications 184 (2013) 2641.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+from operator import le
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +19,7 @@ from numpy.typing import NDArray
 
 from motes.interact.arrange import CLUSTER, FAR, Arranged
 from motes.interact.cells import Grid
-from motes.jit import STRICT, each, jit
+from motes.jit import STRICT, Calls, each, jit
 from motes.machine.shuffles import LANES, near_slots, taken_apart
 from motes.memory import afford, allocate
 
@@ -45,8 +47,19 @@ class Clusters(NamedTuple):
     longest: int
 
 
-Room = list[NDArray[np.int32]]
-"""Memory for entries of consecutive parts, to be used again for lists that replace those in it."""
+@dataclass
+class Room:
+    """Memory of the lists of consecutive parts, to be used again for lists that replace them."""
+
+    entries: list[NDArray[np.int32]] = field(default_factory=list)
+    work: list[Any] = field(default_factory=list)
+    """What a kernel was called with for each part, while that may be so again."""
+    calls: Calls | None = None
+    """The same as calls of the kernel."""
+    chosen: Calls | None = None
+    """Lists of particles as calls of who reads them."""
+    lists: Sequence[Clusters] | None = None
+    """The lists of clusters that they were chosen from."""
 
 
 class _Candidates(NamedTuple):
@@ -253,54 +266,69 @@ def cluster_lists(
     head = (
         targets.real.position, sources.real, sources.ghosts, cut, sources.inner, float(radius)
     )  # fmt: skip
-    work = []
+    room.work, room.calls = [], None
     for k, cluster in enumerate(targets.clusters):
         first, entry = np.zeros(cluster.size, np.int64), _again(room, k, 400 * cluster.size)
-        work.append((k, cluster, _candidates(1024, real), first, entry))
-    longest = _carried_out(_seek, head, work, room)
-    return [Clusters(one[1], one[3], one[4], longest[one[0]]) for one in work]
+        room.work.append((k, cluster, _candidates(1024, real), first, entry))
+    longest, _ = _carried_out(_seek, head, room)
+    found = [Clusters(one[1], one[3], one[4], longest[one[0]]) for one in room.work]
+    room.work, room.calls = [], None
+    return found
 
 
 def particle_lists(
     lists: Sequence[Clusters], own: NDArray[Any], others: NDArray[Any], radius: float,
     itself: bool, room: Room,
-) -> list[Part]:  # fmt: skip
+) -> Calls:  # fmt: skip
     """Each particle's neighbours within `radius` [m] of places (slots + 1, 4), without itself.
 
-    `itself` says that particles are among the others; entries go into `room` as before.
+    `itself` says that particles are among the others; entries go into `room` as before. Returns
+    the lists, `Part`s, as last arguments of calls: those of before where they are in the same
+    memory.
     """
     real = own.dtype.type
-    work = []
-    for k, (cluster, near_first, near, longest) in enumerate(lists):
-        many = int(cluster[-1] - cluster[0])
-        first, entry = np.zeros(many + 1, np.int64), _again(room, k, 96 * many)
-        place = np.empty((3, longest), real)
-        work.append((k, cluster, near_first, near, place, first, entry))
-    most = _carried_out(_choose, (own, others, real(radius) ** 2, itself), work, room)
-    return [Part(int(one[1][0]), one[5], one[6], most[one[0]]) for one in work]
+    if room.lists is not lists:
+        room.lists, room.work, room.calls, room.chosen = lists, [], None, None
+        for k, (cluster, near_first, near, longest) in enumerate(lists):
+            many = int(cluster[-1] - cluster[0])
+            first, entry = np.zeros(many + 1, np.int64), _again(room, k, 96 * many)
+            place = np.empty((3, longest), real)
+            room.work.append((k, cluster, near_first, near, place, first, entry))
+    most, grown = _carried_out(_choose, (own, others, real(radius) ** 2, itself), room)
+    if room.chosen is not None and not grown:
+        known = [int(part[-1]) for part in room.chosen.tails]
+        if all(map(le, most, known)):
+            return room.chosen
+        most = list(map(max, most, known))
+    room.chosen = Calls([Part(int(one[1][0]), one[5], one[6], most[one[0]]) for one in room.work])
+    return room.chosen
 
 
 def _again(room: Room, k: int, likely: int) -> NDArray[np.int32]:
     """Memory for a part's entries: that of before, if there is any."""
-    return room[k] if k < len(room) else np.empty(likely + 4096, np.int32)
+    return room.entries[k] if k < len(room.entries) else np.empty(likely + 4096, np.int32)
 
 
-def _carried_out(kernel: Any, head: Any, work: list[Any], room: Room) -> list[int]:
+def _carried_out(kernel: Any, head: Any, room: Room) -> tuple[list[int], bool]:
     """Let a kernel fill the lists of all parts, with more room for those that need it.
 
-    Returns the length of the longest list of every part, at least one vector.
+    Returns the length of the longest list of every part, at least one vector, and whether any
+    needed more room.
     """
+    work = room.work
     state = np.zeros((len(work), 3), np.int64)
-    waiting = work
-    while waiting:
-        each(kernel, (*head, state), waiting)
-        waiting = [one for one in work if state[one[0], 0] < one[1].size - 1]
+    if room.calls is None:
+        room.calls = Calls(list(work))
+    each(kernel, (*head, state), room.calls)
+    grown = False
+    while waiting := [one for one in work if state[one[0], 0] < one[1].size - 1]:
+        grown, room.calls = True, None
         for one in waiting:
             work[one[0]] = _wider(one, *state[one[0], :2].tolist())
             afford(sum(part[-1].nbytes for part in work), "a list of neighbours")
-        waiting = [work[one[0]] for one in waiting]
-    room[:] = [one[-1] for one in work]
-    return [max(LANES, longest) for longest in state[:, 2].tolist()]
+        each(kernel, (*head, state), [work[one[0]] for one in waiting])
+    room.entries = [one[-1] for one in work]
+    return [max(LANES, longest) for longest in state[:, 2].tolist()], grown
 
 
 def _wider(one: Any, begin: int, points: int) -> Any:

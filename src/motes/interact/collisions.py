@@ -167,10 +167,12 @@ def _hit(
             dz -= period[2] * np.round(dz / period[2])
             reach = 0.5 * (size[i] + size[j])
             square = dx * dx + dy * dy + dz * dz
-            if square >= reach * reach or square == 0:
+            if square >= reach * reach:
                 continue
             far = np.sqrt(square)
-            nx, ny, nz = dx / far, dy / far, dz / far
+            nx, ny, nz = 1.0, 0.0, 0.0  # Two at one place part along x.
+            if far > 0:
+                nx, ny, nz = dx / far, dy / far, dz / far
             wi, wj = 1 / m[i], 1 / m[j]
             ux, uy, uz = v[0, i] - v[0, j], v[1, i] - v[1, j], v[2, i] - v[2, j]
             un = ux * nx + uy * ny + uz * nz

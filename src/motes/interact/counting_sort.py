@@ -91,6 +91,9 @@ def sorted_rows(key: NDArray[np.uint64], bits: int) -> tuple[NDArray[np.uint64],
     return key, row
 
 
+FEWEST = 1 << 15
+"""Rows that are counted in one part, where a second thread would cost more than it brings."""
+
 HALVES = 2
 """Parts of the rows that are counted by themselves where the key is not cut into digits: each has
 as many counters as there are keys."""
@@ -134,7 +137,7 @@ def counted_rows(
     Rows that are almost in order already are read and written almost in order. What is returned
     is in `room`, if one is given.
     """
-    parts = blocks(len(key), max(1, -(-len(key) // HALVES)))
+    parts = blocks(len(key), max(FEWEST, -(-len(key) // HALVES)))
     counts = room_for(room, "counts", (len(parts), keys), np.int32)
     share(lambda part: _count_all(key[slice(*parts[part])], counts[part]), len(parts))
     first = room_for(room, "first", (keys + 1,), np.int32)

@@ -48,7 +48,7 @@ class HardSpheres:
         v = np.concatenate([one.velocity for one in movers], axis=1).astype(float)
         m = np.concatenate([one.mass for one in movers]).astype(float)
         size = np.concatenate([one.size for one in movers]).astype(float)
-        if m.size < 2 or not np.isfinite(x).all():
+        if m.size < 2 or not size.max() > 0 or not np.isfinite(x).all():
             return False
         low, box = when.periodic.low[:, None], when.periodic.size
         inside = x - low

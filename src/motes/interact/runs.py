@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from motes.interact.cells import Grid, first_from, grid
 from motes.jit import STRICT, jit
-from motes.machine.lanes import put_some, take
+from motes.machine.lanes import fetch, put_some, take
 
 ALONG = 4
 """Cells along x for each reach."""
@@ -34,9 +34,9 @@ def rows_of_cells(
     bounds: NDArray[np.float64], reach: float, across: int, box: NDArray[Any], low: NDArray[Any]
 ) -> Grid:
     """Cells of a reach [m] by `ALONG` along x and `across` along y and z, for points in bounds."""
-    width = reach / np.array([ALONG, across, across], float)
-    cut = grid(bounds, width, box)
-    return cut._replace(low=np.where(np.isfinite(box), low, cut.low))
+    cut = grid(bounds, (reach / ALONG, reach / across, reach / across), box)
+    np.copyto(cut.low, low, where=np.isfinite(box))
+    return cut
 
 
 def rows_wanted(key: NDArray[np.uint64]) -> int:
@@ -44,11 +44,23 @@ def rows_wanted(key: NDArray[np.uint64]) -> int:
 
     Where points are dense, narrow rows miss what is out of reach.
     """
-    begins = np.linspace(0, max(key.size - SAMPLE, 0), SAMPLES if key.size > SAMPLE else 1)
-    some = np.concatenate([key[int(begin) : int(begin) + SAMPLE] for begin in begins])
-    counts = np.diff(np.flatnonzero(np.diff(some)), prepend=-1, append=some.size - 1).astype(float)
-    seen = 1 + ALONG * (np.square(counts).sum() / max(some.size, 1) - 1)
-    return int(np.clip(np.round((seen / ROW) ** (1 / 3)), 1, MOST_ACROSS))
+    some = key
+    if key.size > SAMPLE:
+        begins = np.linspace(0, key.size - SAMPLE, SAMPLES).astype(int).tolist()
+        some = np.concatenate([key[begin : begin + SAMPLE] for begin in begins])
+    seen = 1 + ALONG * (_together(some) / max(some.size, 1) - 1)
+    wanted: float = (max(seen, 0.0) / ROW) ** (1 / 3)
+    return min(max(round(wanted), 1), MOST_ACROSS)
+
+
+@jit
+def _together(key: Any) -> Any:
+    """Sum of the squares of how many equal ones are next to one another."""
+    total, run = np.int64(0), np.int64(0)
+    for i in range(key.size):
+        run = run + 1 if i > 0 and key[i] == key[i - 1] else np.int64(1)
+        total += 2 * run - 1
+    return total
 
 
 @jit(flags=STRICT)
@@ -136,6 +148,8 @@ def runs_near(low: Any, high: Any, reach: Any, grid: Any, cells: Any, run: Any, 
                 begin = row + i - around_x * nx
                 a = first_from(np.uint64(begin), cells)
                 b = first_from(np.uint64(begin + end - i + 1), cells)
+                ahead = np.uint64(begin + end - i + AHEAD)
+                fetch(cells.first, ahead >> cells.shift)
                 if a < b:
                     if number < size:
                         run[number, 0], run[number, 1] = a, b
@@ -148,38 +162,54 @@ def runs_near(low: Any, high: Any, reach: Any, grid: Any, cells: Any, run: Any, 
     return number, points
 
 
+AHEAD = 16
+"""Cells beyond a run whose entry of the table is fetched for those who look up the next ones."""
+
+SHORT = 4
+"""Whole vectors of a run that are written down without asking whether it is as long."""
+
+
 @cache
 def chooser(lanes: int) -> Any:
     """A kernel that chooses points, looking at a number of them at once.
 
-    `choose(places, low, high, limit, r, number, run, shift, ramp, pick)` writes into `pick` what is
-    within reach of a box, `limit` its square, in run r and those after it that are shifted alike.
-    It returns the run after them, and how many points there are. `ramp` is 0, 1, 2, ...
+    `choose(places, spots, limit, r, number, run, shift, block, ramp, pick)` writes into `pick` what
+    is within reach of any of `spots` (3, lanes), `limit` its square, in run r and those after it
+    that are shifted alike. It returns the run after them, and how many points there are. `block` is
+    room, `ramp` is 0, 1, 2, ...
+
+    Runs are written down as whole vectors first: a loop over few, whose number changes from run to
+    run, costs more for the guesses that the processor gets wrong than for what it does.
     """
 
     @jit(inline=True)
     def choose(
-        places: Any, low: Any, high: Any, limit: Any, r: Any, number: Any, run: Any, shift: Any,
+        places: Any, spots: Any, limit: Any, r: Any, number: Any, run: Any, shift: Any, block: Any,
         ramp: Any, pick: Any,
     ) -> Any:  # fmt: skip
         dx, dy, dz = shift[r, 0], shift[r, 1], shift[r, 2]
-        west, south, floor = low[0] - dx, low[1] - dy, low[2] - dz
-        east, north, roof = high[0] - dx, high[1] - dy, high[2] - dz
-        held = 0
+        blocks = np.int64(0)
         while r < number and shift[r, 0] == dx and shift[r, 1] == dy and shift[r, 2] == dz:
             at, last = run[r, 0], run[r, 1]
-            while at < last:
-                x = take(places[0], at, lanes)
-                y = take(places[1], at, lanes)
-                z = take(places[2], at, lanes)
-                gx = x - max(min(x, east), west)
-                gy = y - max(min(y, north), south)
-                gz = z - max(min(z, roof), floor)
-                who = take(ramp, at, lanes)
-                near = (gx * gx + gy * gy + gz * gz <= limit) & (who < np.int32(last))
-                held += put_some(pick, held, who, near)
-                at += lanes
+            many = (last - at + (lanes - 1)) // lanes
+            for e in range(SHORT):
+                block[blocks + e, 0], block[blocks + e, 1] = at + e * lanes, last
+            for e in range(SHORT, many):
+                block[blocks + e, 0], block[blocks + e, 1] = at + e * lanes, last
+            blocks += many
             r += 1
+        held = 0
+        for k in range(blocks):
+            at, last = block[k, 0], block[k, 1]
+            x, y = take(places[0], at, lanes), take(places[1], at, lanes)
+            z, who = take(places[2], at, lanes), take(ramp, at, lanes)
+            least = limit + limit
+            for e in range(lanes):
+                gx, gy = x - (spots[0, e] - dx), y - (spots[1, e] - dy)
+                gz = z - (spots[2, e] - dz)
+                least = min(least, gx * gx + gy * gy + gz * gz)
+            near = (least <= limit) & (who < np.int32(last))
+            held += put_some(pick, held, who, near)
         return r, held
 
     return choose

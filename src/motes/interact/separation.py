@@ -30,7 +30,7 @@ class Separation:
 
     @kernel
     def near(p, a, b, r):
-        w = (1.0 - r.length * p.per_radius) / (r.length + 1e-6)
+        w = r.inverse - p.per_radius
         return w * r.x, w * r.y, w * r.z
 
     @kernel

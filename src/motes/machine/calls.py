@@ -27,6 +27,7 @@ from motes.machine.kinds import (
 from motes.machine.lanes import (
     bits,
     choose,
+    fetch,
     largest,
     lowest,
     put,
@@ -382,6 +383,7 @@ BUILT_IN: dict[Any, Callable[..., Value]] = {
     enumerate: Calls.numbered,
     take: Calls.take,
     put: Calls.put,
+    fetch: Calls.fetch,
     bits: Calls.bits,
     lowest: Calls.lowest,
     choose: Calls.choose,

@@ -196,6 +196,9 @@ class Door:
             function, last = self._function, lasts[0]
             return lambda *numbers: function(first + pack(*numbers) + last, None)
         count, stride = len(tails), 8 * len(self._letters)
+        if not middle:
+            same = b"".join([first + last for last in lasts])
+            return lambda: share_out(lambda c, most: run(same, stride, c, count, most), count)
 
         def calls(*numbers: float) -> None:
             whole = b"".join([first + pack(*numbers) + last for last in lasts])

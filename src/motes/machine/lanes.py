@@ -25,6 +25,10 @@ def put(array: Any, place: Any, value: Any) -> None:
         array[place] = value
 
 
+def fetch(array: Any, place: Any) -> None:
+    """Say that elements of an array from a place on, or about there, are read soon."""
+
+
 def streams() -> None:
     """Say of a kernel that it goes through arrays which are too long to be in a cache."""
 

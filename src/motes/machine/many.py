@@ -84,8 +84,11 @@ class Many(Memory):
         return Scalar(kind, self.do(f"call {kind.llvm} {name}({kind.llvm} {value.text}{more})"))
 
     def put_some(self, array: Value, place: Value, value: Value, condition: Value) -> Value:
-        """`lanes.put_some`: by a table of orders for eight lanes of 32 bits, else one by one."""
-        from motes.machine.target import moves_lanes
+        """`lanes.put_some`: in one step for lanes of 32 bits that fill a register, else one by one.
+
+        AVX-512 moves the lanes that count together; AVX2 permutes eight by a table of orders.
+        """
+        from motes.machine.target import has, moves_lanes
 
         truth = self.truth(condition)
         if not isinstance(array, View) or not isinstance(value, Scalar):
@@ -103,6 +106,12 @@ class Many(Memory):
             self.declare("declare <8 x i32> @llvm.x86.avx2.permd(<8 x i32>, <8 x i32>)")
             call = f"call <8 x i32> @llvm.x86.avx2.permd(<8 x i32> {whole}, <8 x i32> {order})"
             self.line(f"store <8 x i32> {self.do(call)}, ptr {at}, align 4{memory}")
+        elif lanes == 16 and one.bytes == 4 and has("avx512f"):
+            whole = self.do(f"bitcast <16 x {one.llvm}> {text} to <16 x i32>")
+            name, kind = "@llvm.x86.avx512.mask.compress.v16i32", "<16 x i32>"
+            self.declare(f"declare {kind} {name}({kind}, {kind}, <16 x i1>)")
+            call = f"call {kind} {name}({kind} {whole}, {kind} {whole}, <16 x i1> {truth.text})"
+            self.line(f"store {kind} {self.do(call)}, ptr {at}, align 4{memory}")
         else:
             self._put_one_by_one(one, at, text, truth)
         if lanes == 1:

@@ -84,6 +84,14 @@ class Memory(Arithmetic):
         self.line(f"store {text}{self.kind_of_memory(one)}")
         return Known(None)
 
+    def fetch(self, array: View, place: Scalar) -> Value:
+        """`lanes.fetch`: into the first cache; a place beyond the end does no harm."""
+        item, at = array.type.item, self.offset(place)
+        address = self.do(f"getelementptr {item.stored}, ptr {array.address}, i64 {at}")
+        self.declare("declare void @llvm.prefetch.p0(ptr, i32, i32, i32)")
+        self.line(f"call void @llvm.prefetch.p0(ptr {address}, i32 0, i32 3, i32 1)")
+        return Known(None)
+
     def _start(self, array: View, place: Scalar) -> str:
         if not array.type.packed or array.type.axes != 1 or array.type.item.kind == "b":
             raise Unsupported("lanes are taken from packed numbers along one axis")

@@ -19,7 +19,9 @@ EACH = "motes_each"
 """Name of the function that runs the first for many packs of arguments, whose number threads take
 from a common counter."""
 
-PLAIN = "nounwind mustprogress"
+PLAIN = 'nounwind mustprogress "stackrealign"'
+"""What holds of every function. Vectors that find no register are kept on the stack, where those
+that cross a line of the cache take longer."""
 
 _WORD = 8
 _HEAD = object.__basicsize__

@@ -20,42 +20,47 @@ LEAST = np.float32(0.1)
 
 @traced
 def offsets(balls: Any, chosen: Any, own: Any) -> Any:
-    """x, y, z from the ball `own`, radius and mass of rows `chosen` of a table of balls."""
+    """x, y, z from the ball `own`, radius and spread of rows `chosen` of a table of balls."""
     given = gathered(balls, chosen, 8)
     x, y, z = (given[k] - own[k] + (given[3 + k] - own[3 + k]) for k in range(3))
     return x, y, z, given[6], given[7]
 
 
 @traced
-def columns(cells: Any, chosen: Any) -> Any:
-    """START, END, FIRST and NUMBER of rows `chosen` of a table of cells."""
-    return tuple(gathered(cells, chosen, 4))
+def columns(contents: Any, chosen: Any) -> Any:
+    """Mass, number of particles and of children of rows `chosen` of a table of contents."""
+    return tuple(gathered(contents, chosen, 4)[:3])
 
 
 @cache
 def acceptance(order: int, low: int) -> Callable[..., Any]:
     """Compiled function that tests LANES source cells together, for expansions of two orders.
 
-    (balls, chosen, own, stricter, opening2, reach, e2) -> lanes: whether the rows `chosen` of
-    `balls` are far from the ball `own`, whether they are for the lower order, and their radii. The
-    error of the acceleration is about M / R^2 q^p / (1 - q^2) with q = (r_A + r_B) / R, the sum of
-    the terms that are left out. Cells smaller than the target come in crowds, and errors that the
-    target's radius makes are alike for a crowd: M then stands for M (r_A / r_B)^4, less where r_B
-    is tiny. `stricter` is one over the error that is allowed, for both orders. q^2 is below
-    `opening2`, the balls are more than `reach` apart, and e2 is added to R^2.
+    (balls, chosen, mass, own, stricter, opening2, reach, e2) -> lanes: whether the rows `chosen` of
+    `balls` are far from the ball `own`, whether they are for the lower order, and their radii.
+    Sources s from B's center make an error of about sum m (r_A + s)^p / R^(p + 2) / (1 - q^2) in
+    the acceleration at distance r_A from A's, the sum of the terms that are left out, with
+    q = (r_A + r_B) / R. By Minkowski's inequality that sum is at most M (r_A + S)^p with B's spread
+    S = (sum m s^p / M)^(1/p): a few light bodies at the edge of B count for little. Cells smaller
+    than the target come in crowds, and errors that the target's radius makes are alike for a crowd:
+    M then stands for M (r_A / r_B)^4, less where r_B is tiny. `stricter` is one over the error that
+    is allowed, for both orders. q^2 is below `opening2`, the balls are more than `reach` apart, and
+    e2 is added to R^2.
     """
 
     @jit(inline=True, flags=EXACT)
     def is_far(
-        balls: Any, chosen: Any, own: Any, stricter: Any, opening2: Any, reach: Any, e2: Any
-    ) -> Any:
-        x, y, z, radius, mass = offsets(balls, chosen, own)
+        balls: Any, chosen: Any, mass: Any, own: Any, stricter: Any, opening2: Any, reach: Any,
+        e2: Any,
+    ) -> Any:  # fmt: skip
+        x, y, z, radius, spread = offsets(balls, chosen, own)
         r2 = x * x + y * y + z * z + e2
         radii = radius + own[6]
         gap, square = radii + reach, radii * radii
         inverse = 1 / r2
-        q2 = square * inverse
-        rest = 1 - q2
+        rest = 1 - square * inverse
+        spreads = spread + own[6]
+        q2 = spreads * spreads * inverse
         own2 = own[6] * own[6]
         smaller = own2 / (radius * radius + own2 * LEAST)
         pull = mass * inverse * choose(smaller > 1, smaller * smaller, 1)

@@ -15,11 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.interact.gravity.desk import Desk, Limits, desk
+from motes.interact.gravity.sample import Sample, sample_of
 from motes.interact.gravity.translations import translations
 from motes.interact.gravity.tree import (
-    END,
-    NUMBER,
-    RADIUS,
     START,
     Box,
     Tree,
@@ -34,18 +32,15 @@ from motes.jit import blocks, share, threads
 SINGLE_FROM = 4e-6
 """Smallest tolerance that single precision keeps."""
 
-LEAVES = 16
-"""Target leaves in the first class of the sample: those of the largest radius, all of them."""
+SAFETY = 0.85
+"""Part of the tolerance that the likely error may use, as seen on the sample."""
 
-LEAVES_OF_A_CLASS = 8
-"""Target leaves out of each further class, which has twice as many as the one before."""
+FIRST, MOST = 5.0, 8.0
+"""What one expansion may neglect, in tolerances: at first, and at most, as single large errors
+would be missed by the sample."""
 
-SAFETY = 0.72
-"""Part of the tolerance that the error on the sample may use."""
-
-GROWTH = 3.0
-"""First trial of what one expansion may neglect: this to the power of order - 2, times the
-tolerance, as errors of many expansions cancel and the estimate is an upper bound."""
+MOMENTUM = 0.1
+"""The same of the sum of all m a: a sun's hangs on few expansions, whose errors do not cancel."""
 
 ENOUGH = 5.0
 """How much less it must neglect at least, or it is made again."""
@@ -59,8 +54,9 @@ TRIALS = 8
 TASKS, FEWEST_TASKS, PARTICLES_OF_A_TASK = 128, 8, 2048
 """Parts of the walk; each of the threads takes one after the other. A part costs 0.1 ms more."""
 
-STRICTER = 10.0
-"""How much less the walk that the sample is compared with may neglect."""
+STRICTER, STRICTEST, LOW_ORDER = 10.0, 100.0, 5
+"""How much less the walk that the sample is compared with may neglect, and how much below an order:
+there errors fall slowly, as many are alike."""
 
 HIGHEST = {True: 12, False: 8}
 """Highest order of harmonic expansions and of others: more would not be faster."""
@@ -121,6 +117,8 @@ class Problem:
     size: float
     potential: bool
     plan: Plan
+    out: NDArray[Any]
+    """Room for sums (4, n) or (3, n), in the order of the tree."""
 
     @staticmethod
     def build(
@@ -140,7 +138,8 @@ class Problem:
         if target is not None:
             tree = octree(target, np.full(len(target), 1 / len(target)), box, plan.leaf)
             targets = summarize(tree, *kind, False)
-        return Problem(targets, sources, law, size, potential, plan)
+        out: NDArray[Any] = np.empty((4 if potential else 3, targets.place.shape[1]), plan.real)
+        return Problem(targets, sources, law, size, potential, plan, out)
 
     def limits(self, error: float, force: float, rounding: float) -> Limits:
         """Limits of the walk; those that depend on the particles alone are filled in."""
@@ -162,34 +161,35 @@ class Problem:
         The error is measured against a walk that neglects much less; it falls at most in proportion
         to what one expansion may neglect. A few leaves cost little, whatever n.
         """
-        sample = self._sample()
+        sample = sample_of(self.targets)
         a = _lengths(self._at(sample, self.limits(math.inf, math.inf, math.inf)))
         scale = sample.typical(a)
         pulled = a * self.targets.place[3, sample.rows]
         force = sample.mean_of_most(pulled) * self.targets.place.shape[1] or math.inf
         rounding = tolerance * scale
-        share, strictest = tolerance * GROWTH ** (self.plan.order - 2), math.inf
+        stricter = STRICTER if self.plan.order >= LOW_ORDER else STRICTEST
+        share, strictest = tolerance * FIRST, math.inf
         kept = None
         for _ in range(TRIALS):
-            # A sun's momentum hangs on single expansions, whose errors do not cancel.
-            limits = self.limits(share * scale, min(share, 8 * tolerance) * force, rounding)
+            limits = self.limits(share * scale, MOMENTUM * tolerance * force, rounding)
             if share < ENOUGH * strictest:
-                strictest = share / STRICTER
+                strictest = share / stricter
                 strict = limits._replace(
                     opening2=limits.opening2 / 2,
                     error=strictest * scale,
-                    force=limits.force / STRICTER,
-                    rounding=rounding / STRICTER,
+                    force=limits.force / stricter,
+                    rounding=rounding / stricter,
                 )
                 exact = self._at(sample, strict)
             part = self._error(sample, self._at(sample, limits), exact) / (SAFETY * tolerance)
             if part <= 1.0:
-                if kept is not None or part > 0.7:
+                if kept is not None or part > 0.7 or share >= MOST * tolerance:
                     return limits
                 kept = limits
             elif kept is not None:
                 return kept
             share *= min(max(0.9 / max(part, 1e-9), 0.05), 3.0)
+            share = min(share, MOST * tolerance)
         return kept or self.limits(0.0, 0.0, rounding)
 
     def solve(self, limits: Limits) -> NDArray[Any]:
@@ -215,9 +215,7 @@ class Problem:
         """Sums at the targets in some ranges (k, 2) of rows, whole leaves, in a number of tasks."""
         walk = walker(self.law, self.plan.real, self.potential, self.plan.order, self.plan.low)
         operations = translations(self.plan.order, self.law != "plummer")
-        same, largest = self.targets is self.sources, largest_leaf(self.targets)
-        rows = 4 if self.potential else 3
-        out: NDArray[Any] = np.empty((rows, self.targets.place.shape[1]), self.plan.real)
+        same, largest, out = self.targets is self.sources, largest_leaf(self.targets), self.out
         desks: SimpleQueue[Desk] = SimpleQueue()
         for _ in range(threads()):
             desks.put(desk(operations, self.plan.real, largest, 1 << 16))
@@ -233,29 +231,9 @@ class Problem:
         share(task, tasks)
         return out
 
-    def _sample(self) -> Sample:
-        """Leaves in classes by radius, as the largest errors are those of few large leaves."""
-        cells = self.targets.cells
-        leaves = np.flatnonzero(cells[:, NUMBER] == 0)
-        borders = [LEAVES << k for k in range(32) if LEAVES << k < len(leaves)]
-        if borders:
-            leaves = leaves[np.argpartition(-self.targets.bodies[leaves, RADIUS], borders)]
-        counts = cells[leaves, END] - cells[leaves, START]
-        chosen, weights, first, last = [np.arange(0)], [np.ones(0)], 0, LEAVES
-        while first < len(leaves):
-            last = min(last, len(leaves))
-            number = min(LEAVES_OF_A_CLASS if first else LEAVES, last - first)
-            some = first + (np.arange(number) * 2 + 1) * (last - first) // (2 * number)
-            chosen.append(some)
-            weights.append(np.full(number, counts[first:last].sum() / counts[some].sum()))
-            first, last = last, 2 * last
-        picked = np.concatenate(chosen)
-        ranges = cells[leaves[picked], :2].astype(np.int64)
-        rows = np.concatenate([np.arange(*r) for r in ranges])
-        return Sample(ranges, rows, np.repeat(np.concatenate(weights), counts[picked]))
-
     def _at(self, sample: Sample, limits: Limits) -> NDArray[np.float64]:
-        sums = self._walk(sample.ranges, min(4 * threads(), len(sample.ranges)), limits)
+        # The largest leaves, which come first, take as long as very many others.
+        sums = self._walk(sample.ranges, len(sample.ranges), limits)
         return sums[:, sample.rows].astype(np.float64)
 
     def _error(
@@ -266,44 +244,6 @@ class Problem:
             parts.append((tried[3] - exact[3], np.abs(exact[3])))
         rounding = 8 * float(np.finfo(self.plan.real).eps)
         return max(sample.relative(wrong, values, rounding) for wrong, values in parts)
-
-
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """Some targets that stand for all."""
-
-    ranges: NDArray[np.int64]
-    """(k, 2) rows in the order of the tree, first and last + 1, whole leaves."""
-    rows: NDArray[np.intp]
-    """The same one by one."""
-    weight: NDArray[np.float64]
-    """How many targets each row stands for."""
-
-    def mean_of_most(self, values: NDArray[np.float64]) -> float:
-        """Mean without the largest sixteenth of those that are not zero.
-
-        Close pairs and large masses may dominate means of few targets by chance, which would allow
-        too large errors.
-        """
-        order = np.argsort(values)
-        order = order[values[order] > 0.0]
-        if not len(order):
-            return 0.0
-        share = np.cumsum(self.weight[order])
-        most = order[share <= max(share[-1] * 15 / 16, share[0])]
-        return float((self.weight[most] * values[most]).sum() / self.weight.sum())
-
-    def typical(self, values: NDArray[np.float64]) -> float:
-        """Root mean square of most values."""
-        return math.sqrt(self.mean_of_most(values**2))
-
-    def relative(
-        self, wrong: NDArray[np.float64], values: NDArray[np.float64], rounding: float
-    ) -> float:
-        """Rms error in units of what is typical, without the rounding of large values."""
-        more = np.maximum(np.abs(wrong) - rounding * values, 0.0)
-        rms = math.sqrt((self.weight * more**2).sum() / self.weight.sum())
-        return rms / (self.typical(values) or math.inf)
 
 
 def _lengths(sums: NDArray[np.float64]) -> NDArray[np.float64]:

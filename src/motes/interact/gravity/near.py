@@ -21,6 +21,16 @@ ROUNDING = 6e-8
 """Change of a difference of coordinates by single precision, in units of the largest of them."""
 
 
+WIDER = 16.0
+"""How many times farther leaves reach that are summed apart from the nearest."""
+
+
+@jit(inline=True)
+def reach_of(body: Any, x: Any, y: Any, z: Any) -> Any:
+    """Largest coordinate of a cell's particles from a place: what rounding is in proportion to."""
+    return max(abs(body[X] - x), abs(body[Y] - y), abs(body[Z] - z)) + body[RADIUS]
+
+
 @cache
 def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
     """Compiled function that adds to `desk.total` the pull of source leaves on a target leaf.
@@ -106,41 +116,59 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
         for axis in range(3):
             for i in range(0, count, LANES):
                 write(target[axis], i, read(targets.near[axis], start + i))
-        packed = pieces = 0
-        distance, own = radius, (0, 0, 0)
+        # Rounding is in proportion to the largest coordinate of what is summed together, and large
+        # leaves around a small one would make it large for all: they are summed apart.
+        least = 1e300
         for k in range(low, high):
             leaf = desk.candidates[k]
-            first, last = cells[leaf, START], cells[leaf, END]
-            itself = same and leaf == cell
-            if itself and radius == 0.0:
-                if potential and depth > 0.0:
-                    for i in range(count):
-                        desk.total[4, i] += bodies[leaf, MASS] * (depth / limits.size)
-                continue
-            dx, dy, dz = bodies[leaf, X] - x, bodies[leaf, Y] - y, bodies[leaf, Z] - z
-            # Largest coordinate: what rounding is in proportion to.
-            reach = max(abs(dx), abs(dy), abs(dz)) + bodies[leaf, RADIUS]
-            sx, sy, sz = nothing, nothing, nothing
-            if single:
-                sx, sy, sz = real(dx), real(dy), real(dz)
-            while first < last:
-                taken = min(last - first, SOURCES - packed)
-                distance = max(distance, reach)
-                if itself:
-                    own = (first - start, first - start + taken, packed - (first - start))
-                # The last lanes may hold more than this leaf; what follows overwrites them.
-                for i in range(0, taken, LANES):
-                    write(new_x, packed + i, read(old_x, first + i) + sx)
-                    write(new_y, packed + i, read(old_y, first + i) + sy)
-                    write(new_z, packed + i, read(old_z, first + i) + sz)
-                    write(new_m, packed + i, read(old_m, first + i))
-                spans[pieces, 0], spans[pieces, 1] = first, first + taken
-                pieces, packed, first = pieces + 1, packed + taken, first + taken
-                if packed == SOURCES:
-                    sum_packed(targets, sources, cell, packed, pieces, distance, own, limits, desk)
-                    packed = pieces = 0
-                    distance, own = radius, (0, 0, 0)
-        if packed > 0:
-            sum_packed(targets, sources, cell, packed, pieces, distance, own, limits, desk)
+            if not (same and leaf == cell):
+                least = min(least, reach_of(bodies[leaf], x, y, z))
+        border = WIDER * max(radius, least) if single else 1e300
+        for wide in range(2):
+            packed = pieces = 0
+            distance, own = radius, (0, 0, 0)
+            left = False
+            for k in range(low, high):
+                leaf = desk.candidates[k]
+                first, last = cells[leaf, START], cells[leaf, END]
+                itself = same and leaf == cell
+                reach = reach_of(bodies[leaf], x, y, z)
+                if (reach > border) != (wide == 1):
+                    left = True
+                    continue
+                if itself and radius == 0.0:
+                    if potential and depth > 0.0:
+                        for i in range(count):
+                            desk.total[4, i] += bodies[leaf, MASS] * (depth / limits.size)
+                    continue
+                sx, sy, sz = nothing, nothing, nothing
+                if single:
+                    sx, sy, sz = (
+                        real(bodies[leaf, X] - x), real(bodies[leaf, Y] - y),
+                        real(bodies[leaf, Z] - z),
+                    )  # fmt: skip
+                while first < last:
+                    taken = min(last - first, SOURCES - packed)
+                    distance = max(distance, reach)
+                    if itself:
+                        own = (first - start, first - start + taken, packed - (first - start))
+                    # The last lanes may hold more than this leaf; what follows overwrites them.
+                    for i in range(0, taken, LANES):
+                        write(new_x, packed + i, read(old_x, first + i) + sx)
+                        write(new_y, packed + i, read(old_y, first + i) + sy)
+                        write(new_z, packed + i, read(old_z, first + i) + sz)
+                        write(new_m, packed + i, read(old_m, first + i))
+                    spans[pieces, 0], spans[pieces, 1] = first, first + taken
+                    pieces, packed, first = pieces + 1, packed + taken, first + taken
+                    if packed == SOURCES:
+                        sum_packed(
+                            targets, sources, cell, packed, pieces, distance, own, limits, desk
+                        )
+                        packed = pieces = 0
+                        distance, own = radius, (0, 0, 0)
+            if packed > 0:
+                sum_packed(targets, sources, cell, packed, pieces, distance, own, limits, desk)
+            if not left:
+                break
 
     return sum_near  # type: ignore[no-any-return]

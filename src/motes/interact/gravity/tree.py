@@ -14,7 +14,8 @@ from motes.jit import blocks, jit, share
 
 START, END, FIRST, NUMBER = 0, 1, 2, 3
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
-LOW, BALL_RADIUS, BALL_MASS = 3, 6, 7
+LOW, BALL_RADIUS, SPREAD = 3, 6, 7
+PULL, COUNT, CHILDREN = 0, 1, 2
 
 FEW = 4
 """Most particles in leaves that are much larger than usual.
@@ -34,13 +35,18 @@ class Tree(NamedTuple):
     of the first child first. A leaf has none; its FIRST is where they would be.
     """
 
+    leaves: NDArray[np.int32]
+    """Rows of the leaves."""
     cells: NDArray[np.int32]
     """(cells, 4) particles START to END, and children from FIRST on, NUMBER of them."""
     bodies: NDArray[np.float64]
     """(cells, 5) center of mass, distance of the particle farthest from it, mass."""
     balls: NDArray[Any]
-    """(cells + LANES, 8) the same as the walk tests many: the center in two parts that sum to it,
-    radius and mass; the last rows are NOTHING."""
+    """(cells + LANES, 8) the cells as the walk tests many: the center in two parts that sum to it,
+    the radius, and how far from the center the mass is: (sum m s^q / sum m)^(1/q) of distances s,
+    with an even q of at least the order of expansions. The last rows are NOTHING."""
+    contents: NDArray[Any]
+    """(cells + LANES, 4) and as it weighs them: mass, number of particles, of children, and 0."""
     order: NDArray[np.uint32]
     """(n,) row of each particle in the arrays that it came from."""
     place: NDArray[np.float64]
@@ -173,7 +179,17 @@ def octree(points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int)
         len(ranges),
     )
     nothing = np.empty((0, 0))
-    return Tree(cells, np.empty((len(cells), 5)), nothing, order, place, nothing, nothing)
+    return Tree(
+        _leaves(cells),
+        cells,
+        np.empty((len(cells), 5)),
+        nothing,
+        nothing,
+        order,
+        place,
+        nothing,
+        nothing,
+    )
 
 
 def _cells(key: NDArray[np.uint64], leaf: int, coarse: int) -> NDArray[np.int32]:
@@ -185,18 +201,41 @@ def _cells(key: NDArray[np.uint64], leaf: int, coarse: int) -> NDArray[np.int32]
     return cells[:count].copy()
 
 
-def _usual_level(key: NDArray[np.uint64], cells: NDArray[np.int32]) -> int:
+def _leaves(cells: NDArray[np.int32]) -> NDArray[np.int32]:
+    found = np.empty(len(cells), np.int32)
+    return found[: _find_leaves(cells, found)]
+
+
+@jit(numba=False)
+def _find_leaves(cells: Any, found: Any) -> Any:
+    count = 0
+    for cell in range(cells.shape[0]):
+        if cells[cell, NUMBER] == 0:
+            found[count] = cell
+            count += 1
+    return count
+
+
+@jit(numba=False)
+def _usual_level(key: Any, cells: Any) -> Any:
     """Level of the cube around the leaf of the median particle, leaves sorted by that."""
-    leaves = cells[cells[:, NUMBER] == 0]
-    apart = key[leaves[:, START]] ^ key[leaves[:, END] - 1]
-    level = LEVELS - np.ceil(np.frexp(apart.astype(np.float64))[1] / 3)
-    order = np.argsort(level)
-    share = np.cumsum((leaves[:, END] - leaves[:, START])[order])
-    return int(level[order[np.searchsorted(share, share[-1] / 2)]])
+    particles = np.zeros(LEVELS + 1, np.int64)
+    for cell in range(cells.shape[0]):
+        if cells[cell, NUMBER] == 0:
+            start, end = cells[cell, START], cells[cell, END]
+            level, shift = 0, np.uint64(3 * (LEVELS - 1))
+            while level < LEVELS and key[start] >> shift == key[end - 1] >> shift:
+                level += 1
+                shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
+            particles[level] += end - start
+    level, below = 0, particles[0]
+    while 2 * below < key.size:
+        level += 1
+        below += particles[level]
+    return level
 
 
 def largest_leaf(tree: Tree) -> int:
     """Most particles in a leaf."""
-    cells = tree.cells
-    leaves = cells[:, NUMBER] == 0
-    return int((cells[leaves, END] - cells[leaves, START]).max())
+    counts = tree.cells[tree.leaves, END] - tree.cells[tree.leaves, START]
+    return int(counts.max())

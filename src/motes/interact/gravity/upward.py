@@ -14,14 +14,17 @@ from motes.interact.gravity.lanes import LANES, maximum, read, spread, write
 from motes.interact.gravity.morton import LEVELS
 from motes.interact.gravity.translations import padded, translations
 from motes.interact.gravity.tree import (
-    BALL_MASS,
     BALL_RADIUS,
+    CHILDREN,
+    COUNT,
     END,
     FIRST,
     LOW,
     MASS,
     NUMBER,
+    PULL,
     RADIUS,
+    SPREAD,
     START,
     Tree,
     X,
@@ -30,7 +33,7 @@ from motes.interact.gravity.tree import (
     cell_unit,
 )
 from motes.jit import EXACT, jit, share
-from motes.machine.lanes import choose, largest
+from motes.machine.lanes import choose, largest, total
 
 TASKS = 64
 """Parts of the upward pass."""
@@ -42,48 +45,72 @@ LIGHT = 1e-30
 """Weight of massless particles in a center, where the masses of all are about 1."""
 
 
-@jit(numba=False)
-def _measure(tree: Tree, cell: Any) -> None:
-    """Fill in a cell's body, its children's being there."""
-    cells, bodies, place = tree.cells, tree.bodies, tree.place
-    start, end, first_child, number = cells[cell]
-    x = y = z = mass = 0.0
-    weights = LIGHT * (end - start)
-    if number == 0:
-        for i in range(start, end):
-            m = place[3, i]
-            mass += m
-            m += LIGHT
-            x += m * place[0, i]
-            y += m * place[1, i]
-            z += m * place[2, i]
-    else:
-        for child in range(first_child, first_child + number):
-            m = bodies[child, MASS]
-            mass += m
-            m += LIGHT * (cells[child, END] - cells[child, START])
-            x += m * bodies[child, X]
-            y += m * bodies[child, Y]
-            z += m * bodies[child, Z]
-    weights += mass
-    x, y, z = x / weights, y / weights, z / weights
-    xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
-    whole = xs.size // LANES * LANES
-    most, r2 = spread(0.0), 0.0
-    for i in range(0, whole, LANES):
-        dx, dy, dz = read(xs, i) - x, read(ys, i) - y, read(zs, i) - z
-        most = maximum(dx * dx + dy * dy + dz * dz, most)
-    for i in range(whole, xs.size):
-        dx, dy, dz = xs[i] - x, ys[i] - y, zs[i] - z
-        r2 = max(r2, dx * dx + dy * dy + dz * dz)
-    r2 = max(r2, largest(most))
-    bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
-    bodies[cell, RADIUS], bodies[cell, MASS] = np.sqrt(r2), mass
-    ball = tree.balls[cell]
-    for axis in range(3):
-        ball[axis] = bodies[cell, axis]
-        ball[LOW + axis] = bodies[cell, axis] - ball[axis]
-    ball[BALL_RADIUS], ball[BALL_MASS] = cell_unit(np.sqrt(r2)), mass
+@cache
+def _measurer(order: int) -> Callable[..., None]:
+    """Compiled function that fills in a cell's body, its children's being there."""
+    squares = (order + 1) // 2
+    root = 0.5 / squares
+
+    @jit(inline=True)
+    def raised(square: Any) -> Any:
+        """s^q from s^2."""
+        power = square
+        for _ in range(squares - 1):
+            power = power * square
+        return power
+
+    @jit(numba=False)
+    def measure(tree: Tree, cell: Any) -> None:
+        cells, bodies, place = tree.cells, tree.bodies, tree.place
+        start, end, first_child, number = cells[cell]
+        x = y = z = mass = 0.0
+        weights = LIGHT * (end - start)
+        if number == 0:
+            for i in range(start, end):
+                m = place[3, i]
+                mass += m
+                m += LIGHT
+                x += m * place[0, i]
+                y += m * place[1, i]
+                z += m * place[2, i]
+        else:
+            for child in range(first_child, first_child + number):
+                m = bodies[child, MASS]
+                mass += m
+                m += LIGHT * (cells[child, END] - cells[child, START])
+                x += m * bodies[child, X]
+                y += m * bodies[child, Y]
+                z += m * bodies[child, Z]
+        weights += mass
+        x, y, z = x / weights, y / weights, z / weights
+        xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
+        ms = place[3, start:end]
+        whole = xs.size // LANES * LANES
+        far, sums, r2, spread_out = spread(0.0), spread(0.0), 0.0, 0.0
+        for i in range(0, whole, LANES):
+            dx, dy, dz = read(xs, i) - x, read(ys, i) - y, read(zs, i) - z
+            s2 = dx * dx + dy * dy + dz * dz
+            far = maximum(s2, far)
+            sums = sums + read(ms, i) * raised(s2)
+        for i in range(whole, xs.size):
+            dx, dy, dz = xs[i] - x, ys[i] - y, zs[i] - z
+            s2 = dx * dx + dy * dy + dz * dz
+            r2 = max(r2, s2)
+            spread_out += ms[i] * raised(s2)
+        radius = np.sqrt(max(r2, largest(far)))
+        spread_out += total(sums)
+        bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
+        bodies[cell, RADIUS], bodies[cell, MASS] = radius, mass
+        ball, content = tree.balls[cell], tree.contents[cell]
+        for axis in range(3):
+            ball[axis] = bodies[cell, axis]
+            ball[LOW + axis] = bodies[cell, axis] - ball[axis]
+        ball[BALL_RADIUS], ball[SPREAD] = cell_unit(radius), 0.0
+        if spread_out > 0.0:
+            ball[SPREAD] = (spread_out / mass) ** root
+        content[PULL], content[COUNT], content[CHILDREN], content[3] = mass, end - start, number, 0
+
+    return measure  # type: ignore[no-any-return]
 
 
 @jit(numba=False)
@@ -110,7 +137,7 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
     operations = translations(order, harmonic)
     particles_to_moments = operations.particles_to_moments
     sums_to_moments = operations.sums_to_moments
-    moments_to_moments = operations.moments_to_moments
+    moments_to_moments, measure = operations.moments_to_moments, _measurer(order)
 
     @jit(flags=EXACT, numba=False)
     def moments_of_leaf(
@@ -158,7 +185,7 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
             for back in range(last - first):
                 cell = last - 1 - back
                 is_leaf = tree.cells[cell, NUMBER] == 0
-                _measure(tree, cell)
+                measure(tree, cell)
                 if is_leaf:
                     _approach(tree, cell, relative)
                 if tree.moments.shape[0] > 0:
@@ -181,10 +208,12 @@ def summarize(tree: Tree, order: int, harmonic: bool, real: type, sources: bool)
     near[:, -LANES:] = 0
     balls: NDArray[Any] = np.empty((len(tree.cells) + LANES, 8), real)
     balls[-LANES:] = NOTHING
+    contents: NDArray[Any] = np.empty((len(tree.cells) + LANES, 4), real)
+    contents[-LANES:] = 0
     moments: NDArray[Any] = np.empty((count, padded(operations.basis)), real)
     moments[-1:] = 0  # Of rows that lanes which are left over are about.
     ascending = np.arange(LANES, dtype=np.int32)
-    tree = tree._replace(moments=moments, near=near, balls=balls)
+    tree = tree._replace(moments=moments, near=near, balls=balls, contents=contents)
 
     def cells(ranges: Any) -> None:
         place: NDArray[Any] = np.ones((5, LANES), real)

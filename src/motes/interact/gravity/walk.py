@@ -73,7 +73,7 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
     expand = _expander(operations)
     expand_easily = _expander(translations(low_order, harmonic))
     is_far = acceptance(order, low_order)
-    single = real is np.float32
+    single, nothing = real is np.float32, real(0)
 
     @jit(flags=EXACT, numba=False)
     def gather(
@@ -94,7 +94,7 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
         allowed = min(error, limits.force / max(targets.bodies[cell, MASS], 1e-300))
         allowed = max(allowed, real(1e-30))
         stricter = real(1.0 / allowed), real(limits.easier / allowed)
-        few = np.int32(limits.few // count)
+        few = real(limits.few // count)
         ascending = read(desk.ascending, 0)
         opening2, reach = real(limits.opening2), real(limits.reach)
         desk.gathered[:] = 0
@@ -120,13 +120,13 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
             write(chosen, 0, some)
             if top + LANES > candidates.size:
                 return -1
+            mass, particles, children = columns(sources.contents, chosen)
             separate, low_order_does, others = is_far(
-                sources.balls, chosen, own, stricter, opening2, reach, e2
+                sources.balls, chosen, mass, own, stricter, opening2, reach, e2
             )
-            start, end, _, children = columns(sources.cells, chosen)
-            inner = children > np.int32(0)
+            valid, inner = valid & (mass > nothing), children > nothing
             if is_leaf:
-                separate = separate & (inner | (np.int32(end - start) > few))
+                separate = separate & (inner | (particles > few))
                 divides = inner
             else:
                 divides = inner & (others >= radius)

@@ -1,0 +1,102 @@
+"""Targets that stand for all: where errors are measured before all sums are formed."""
+
+# mypy: disallow-untyped-decorators=False
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from motes.interact.gravity.tree import END, RADIUS, START, Tree
+
+LEAVES = 16
+"""Target leaves in the first class of the sample: those of the largest radius, all of them."""
+
+LEAVES_OF_A_CLASS = 8
+"""Target leaves out of each further class, which has twice as many as the one before."""
+
+DEVIATIONS = 2.0
+"""Standard errors of a mean square by which it may be larger than the sample says."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Some targets that stand for all, whole leaves."""
+
+    ranges: NDArray[np.int64]
+    """(k, 2) rows in the order of the tree, first and last + 1, of each leaf."""
+    rows: NDArray[np.intp]
+    """The same one by one."""
+    weight: NDArray[np.float64]
+    """How many targets each row stands for."""
+    classes: NDArray[np.intp]
+    """(c + 1,) where the leaves of each class begin, and their end."""
+    chance: NDArray[np.float64]
+    """(c,) share of the leaves of a class that were not chosen."""
+
+    def mean_of_most(self, values: NDArray[np.float64]) -> float:
+        """Mean without the largest sixteenth of those that are not zero.
+
+        Close pairs and large masses may dominate means of few targets by chance, which would allow
+        too large errors.
+        """
+        order = np.argsort(values)
+        order = order[values[order] > 0.0]
+        if not len(order):
+            return 0.0
+        share = np.cumsum(self.weight[order])
+        most = order[share <= max(share[-1] * 15 / 16, share[0])]
+        return float((self.weight[most] * values[most]).sum() / self.weight.sum())
+
+    def typical(self, values: NDArray[np.float64]) -> float:
+        """Root mean square of most values."""
+        return math.sqrt(self.mean_of_most(values**2))
+
+    def relative(
+        self, wrong: NDArray[np.float64], values: NDArray[np.float64], rounding: float
+    ) -> float:
+        """Largest likely rms error in units of what is typical, without the rounding of large values.
+
+        The mean square over all is that of the sample within its standard error, which follows from
+        how much leaves of one class differ.
+        """
+        more = np.maximum(np.abs(wrong) - rounding * values, 0.0)
+        counts = self.ranges[:, 1] - self.ranges[:, 0]
+        sums = np.add.reduceat(self.weight * more**2, np.cumsum(counts) - counts)
+        variance = 0.0
+        for first, last, chance in zip(
+            self.classes[:-1], self.classes[1:], self.chance, strict=True
+        ):
+            if chance:
+                variance += chance * (last - first) * sums[first:last].var(ddof=1)
+        square = (sums.sum() + DEVIATIONS * math.sqrt(variance)) / self.weight.sum()
+        return math.sqrt(square) / (self.typical(values) or math.inf)
+
+
+def sample_of(tree: Tree) -> Sample:
+    """Leaves in classes by radius, as the largest errors are those of few large leaves.
+
+    Those chosen from a class are far from each other along the tree's curve.
+    """
+    leaves, cells = tree.leaves, tree.cells
+    borders = [LEAVES << k for k in range(32) if LEAVES << k < len(leaves)]
+    if borders:
+        leaves = leaves[np.argpartition(-tree.bodies[leaves, RADIUS], borders)]
+    counts = cells[leaves, END] - cells[leaves, START]
+    chosen, weights, chances = [], [], []
+    for first, last in zip([0, *borders], [*borders, len(leaves)], strict=True):
+        number = min(LEAVES_OF_A_CLASS if first else LEAVES, last - first)
+        along = first + np.argsort(leaves[first:last])
+        some = along[(np.arange(number) * 2 + 1) * (last - first) // (2 * number)]
+        chosen.append(some)
+        weights.append(np.full(number, counts[first:last].sum() / counts[some].sum()))
+        chances.append(1 - number / (last - first))
+    picked = np.concatenate(chosen)
+    ranges: Any = cells[leaves[picked], :2].astype(np.int64)
+    rows = np.concatenate([np.arange(*r) for r in ranges])
+    classes = np.cumsum([0, *map(len, chosen)])
+    weight = np.repeat(np.concatenate(weights), counts[picked])
+    return Sample(ranges, rows, weight, classes, np.array(chances))
