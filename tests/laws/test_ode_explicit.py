@@ -242,7 +242,7 @@ def test_senseless_arguments_are_refused(change, message):
         ode.solve(circle, [np.nan, 0.0], (0, 1))
     for state in ([], [1j, 0.0]):
         with pytest.raises(ValueError, match="y0 must"):
-            ode.solve(circle, state, (0, 1), **{"step": 0.1, "method": "rk4"})
+            ode.solve(circle, state, (0, 1), step=0.1, method="rk4")
 
 
 @pytest.mark.parametrize("wrong", [lambda t, y: (1.0,) * 3, lambda t, y: y[0], lambda t, y: ()])
