@@ -11,6 +11,7 @@ import pytest
 import motes
 from motes import catalog
 from motes.catalog import component, quantity
+from motes.errors import SimulationError
 from motes.integrate import method, methods
 
 
@@ -179,6 +180,23 @@ def test_a_stiff_net_settles_where_explicit_methods_explode(
     assert strain(sim) < 0.005
     momentum = sim["net"].velocity.astype(float).sum(axis=0)
     assert momentum == pytest.approx(0.0, abs=1e-9 if precision == "double" else 1e-1)
+
+
+def test_rodas4_says_where_single_precision_is_too_coarse() -> None:
+    """A stiff chain of a law with lists: h^2 k = 10, whose matrix wants finer differences."""
+    scene = motes.Scene(
+        systems=[motes.System("chain")],
+        interact=[motes.interact.NearSpring(stiffness=1e5, length=1.0, breaking=1.5)],
+        integrator="rodas4",
+        step=0.01,
+        precision="single",
+    )
+    sim = motes.Simulation(scene)
+    places = np.zeros((20, 3))
+    places[:, 0] = np.arange(20) + 1e-3 * np.random.default_rng(1).normal(size=20)
+    sim.place("chain", places)
+    with pytest.raises(SimulationError, match="single precision"):
+        sim.run(steps=2)
 
 
 def test_an_explicit_method_explodes_in_the_stiff_net() -> None:

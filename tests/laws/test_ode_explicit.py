@@ -226,6 +226,13 @@ def test_explicit_methods_explode_on_stiff_decay_beyond_their_limit():
         ({"at": [2.0]}, "within the span"),
         ({"at": [0.5, 0.2]}, "direction"),
         ({"rtol": -1.0}, "rtol"),
+        ({"rtol": [1e-3, 1e-3]}, "rtol must be one number"),
+        ({"atol": [1.0, 2.0, 3.0]}, "shape of y0"),
+        ({"at": [0.0, np.nan, 1.0]}, "direction"),
+        ({"step": 1e-300}, "steps"),
+        ({"first_step": np.nan}, "first_step must be above 0"),
+        ({"largest_step": 0.0}, "largest_step must be above 0"),
+        ({"largest_step": np.nan}, "largest_step must be above 0"),
     ],
 )
 def test_senseless_arguments_are_refused(change, message):
@@ -233,6 +240,9 @@ def test_senseless_arguments_are_refused(change, message):
         ode.solve(circle, [1.0, 0.0], (0, 1), **change)
     with pytest.raises(ValueError, match="finite"):
         ode.solve(circle, [np.nan, 0.0], (0, 1))
+    for state in ([], [1j, 0.0]):
+        with pytest.raises(ValueError, match="y0 must"):
+            ode.solve(circle, state, (0, 1), step=0.1, method="rk4")
 
 
 @pytest.mark.parametrize("wrong", [lambda t, y: (1.0,) * 3, lambda t, y: y[0], lambda t, y: ()])

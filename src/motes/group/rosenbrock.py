@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.compile.linearised import DRIFT, DRIFT_TIMES
-from motes.group.krylov import Vector, gmres
+from motes.errors import SimulationError
+from motes.group.krylov import Vector, gmres, norm
 from motes.group.lasting import Lasting
 from motes.group.members import Member
 from motes.group.methods import at, combined
@@ -28,6 +29,13 @@ if TYPE_CHECKING:
 
 FAR = 1e-2
 """What a linear system may be off at most, as a share of its right side."""
+
+COARSE = 1e-10
+"""Rounding from which on differences are coarse."""
+
+STIFF = 1.1
+"""Factor by which an interaction may answer back in a step, where differences are coarse: no
+iteration takes away what is wrong with the matrix, and errors grow from step to step."""
 
 Members = dict[str, Member]
 Blocks = dict[str, NDArray[Any]]
@@ -87,9 +95,16 @@ class _Solve:
         def rest(q: Vector) -> Vector:
             return q - self.caused(self.led(still, q))
 
-        q, left = gmres(rest, self.caused(self.led(right, quiet)), self.rounding**0.6)
+        first = self.caused(self.led(right, quiet))
+        q, left = gmres(rest, first, self.rounding**0.6)
         if not left < FAR:
             raise unsolved(self.interval)
+        if self.rounding > COARSE and norm(first) > STIFF * norm(q):
+            raise SimulationError(
+                f"at t = {self.interval.begin:.6g} s the interaction is too stiff for a Rosenbrock "
+                "method in single precision, whose differences are too coarse for its matrix. Try "
+                'precision = "double", or backward_euler or radau5.'
+            )
         return self.led(right, q)
 
     def led(self, right: Blocks, q: Vector) -> Blocks:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import Any, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,9 @@ from motes.ode.solution import Crossings, Event, Work
 
 PORTION = 0.05
 """Seconds that one call of a compiled loop should last, so that Ctrl-C works between calls."""
+
+MOST = 2.0**53
+"""Fixed steps that can be counted: beyond, n + 1 is n."""
 
 
 @dataclass(frozen=True)
@@ -241,9 +244,25 @@ def as_events(events: Sequence[Event | Callable[..., Any]]) -> tuple[Event, ...]
     return tuple(event if isinstance(event, Event) else Event(event) for event in events)
 
 
+def numbers(values: ArrayLike, name: str) -> Array:
+    """An array of real numbers, once they are known to be such."""
+    try:
+        return np.array(values, float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be real numbers, not {str(values)[:60]}") from None
+
+
+def positive(value: float, name: str) -> None:
+    """Refuse a length that is no finite number above 0."""
+    if not isinstance(value, SupportsFloat) or not 0 < float(value) < math.inf:
+        raise ValueError(f"{name} must be above 0, not {value}")
+
+
 def checked(state: Array, name: str) -> Array:
     """An initial state as one row, once it is known to be finite."""
     flat = state.reshape(-1)
+    if not flat.size:
+        raise ValueError(f"{name} must have at least one number")
     if not np.isfinite(flat).all():
         raise ValueError(f"{name} must be finite")
     return flat
@@ -251,7 +270,10 @@ def checked(state: Array, name: str) -> Array:
 
 def ends(span: tuple[float, float]) -> tuple[float, float]:
     """Start and end of a span, once they are known to be finite."""
-    start, stop = float(span[0]), float(span[1])
+    try:
+        start, stop = map(float, span)
+    except (TypeError, ValueError):
+        raise ValueError(f"the span must be two times, (t0, t1), not {span!r}") from None
     if not (math.isfinite(start) and math.isfinite(stop)):
         raise ValueError(f"the span must be finite, not {start:g} to {stop:g}")
     return start, stop
@@ -262,9 +284,9 @@ def asked(at: ArrayLike | None, span: tuple[float, float]) -> Array:
     start, stop = ends(span)
     if at is None:
         return np.zeros(0)
-    times = np.array(at, float)
+    times = numbers(at, "at")
     sign = 1.0 if stop >= start else -1.0
-    if times.ndim != 1 or (np.diff(sign * times) < 0).any():
+    if times.ndim != 1 or not (np.diff(sign * times) >= 0).all():
         raise ValueError("`at` must be one row of times in the direction of the span")
     if times.size and not (sign * times[0] >= sign * start and sign * times[-1] <= sign * stop):
         raise ValueError(f"`at` must lie within the span, {start:g} to {stop:g}")
@@ -273,9 +295,11 @@ def asked(at: ArrayLike | None, span: tuple[float, float]) -> Array:
 
 def fixed(span: tuple[float, float], step: float, limit: int) -> Control:
     """Control with a fixed step: n steps, the last shortened to end at the end of the span."""
-    if not 0 < step < math.inf:
-        raise ValueError(f"step must be above 0, not {step:g}")
+    positive(step, "step")
     start, stop = ends(span)
-    count = max(1, math.ceil(abs(stop - start) / step * (1 - 1e-12)))
+    steps = abs(stop - start) / step
+    if not steps < MOST:
+        raise ValueError(f"step must be longer than {step:g}: these would be {steps:.3g} steps")
+    count = max(1, math.ceil(steps * (1 - 1e-12)))
     signed = math.copysign(step, stop - start)
     return Control(True, start, stop, signed, count, 0.0, 1.0, math.inf, limit)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, SupportsFloat
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +17,17 @@ from motes.ode.arithmetic import Array
 from motes.ode.implicit_frame import EXACTLY
 from motes.ode.jacobian import Newton, NewtonKey
 from motes.ode.march import Control
-from motes.ode.run import Machine, March, as_events, asked, checked, ends, fixed
+from motes.ode.run import (
+    Machine,
+    March,
+    as_events,
+    asked,
+    checked,
+    ends,
+    fixed,
+    numbers,
+    positive,
+)
 from motes.ode.solution import Event, Solution
 from motes.tableau import BackwardDifference, Explicit, Implicit, Rosenbrock, Table
 
@@ -77,7 +87,8 @@ def solve(
         SceneError: there is no such method.
         ValueError: a step, tolerance or time that makes no sense, or a method that cannot do this.
     """
-    start = np.array(y0, float)
+    start = numbers(y0, "y0")
+    checked(start, "y0")
     shape = start.shape
     watched = as_events(events)
     table = find(method)
@@ -86,6 +97,10 @@ def solve(
         control = fixed(span, step, max_steps)
     else:
         control = _adaptive(method, table, span, rtol, atol, largest_step, max_steps)
+    if first_step is not None:
+        positive(first_step, "first_step")
+    if newton is not None and not isinstance(newton, Newton):
+        raise ValueError("newton must be an ode.Newton, which says how equations are solved")
     functions = tuple(event.function for event in watched)
     if stiff is not None and not getattr(table, "a_explicit", ()):
         pairs = [name for name, t in methods().items() if getattr(t, "a_explicit", ())]
@@ -153,9 +168,12 @@ def _implicit(
 
 def _tolerances(atol: ArrayLike, shape: tuple[int, ...]) -> Array:
     """An absolute tolerance for each component, in one row."""
-    result = np.empty(shape)
-    result[...] = atol
-    return result.reshape(-1)
+    given = numbers(atol, "atol")
+    if given.shape not in ((), shape):
+        raise ValueError(
+            f"atol must be a number or have the shape of y0, {shape}, not {given.shape}"
+        )
+    return np.broadcast_to(given, shape).reshape(-1).copy()
 
 
 def _size(start: Array) -> float:
@@ -175,6 +193,10 @@ def _adaptive(
     past = isinstance(table, BackwardDifference)
     if getattr(table, "b_low", None) is None and not past:
         raise ValueError(f'"{method}" has no error estimate: give it a step')
+    if not isinstance(rtol, SupportsFloat):
+        raise ValueError(f"rtol must be one number, not {rtol!r}")
+    if not largest > 0:
+        raise ValueError(f"largest_step must be above 0, not {largest}")
     least = atol if isinstance(atol, float | int) else float(np.min(atol, initial=math.inf))
     if not (0 <= rtol < 1 and least >= 0 and (rtol > 0 or least > 0)):
         raise ValueError("rtol must lie in 0 ... 1 and atol be at least 0, one of them above 0")

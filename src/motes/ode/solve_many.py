@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,7 +16,7 @@ from motes.jit import blocks, share
 from motes.ode import lanes
 from motes.ode.arithmetic import Array, Kernel
 from motes.ode.right_hand_side import compiled
-from motes.ode.run import asked, ends
+from motes.ode.run import asked, ends, fixed, numbers
 from motes.ode.solve import MOST_STEPS, solve
 from motes.tableau import Explicit
 
@@ -91,10 +90,10 @@ def solve_many(
         SceneError: there is no such method.
         ValueError: shapes, times or tolerances that make no sense.
     """
-    starts = np.array(y0s, float)
+    starts = numbers(y0s, "y0s")
     if starts.ndim == 0:
         raise ValueError("y0s must be (m, ...): one initial state for each system")
-    given = [np.asarray(arg, float) for arg in args]
+    given = [numbers(arg, "an argument") for arg in args]
     for arg in given:
         if arg.shape not in ((), (len(starts),)):
             raise ValueError(f"an argument is a number or ({len(starts)},), not {arg.shape}")
@@ -110,10 +109,10 @@ def solve_many(
     ):
         if step is None and table.b_low is None:
             raise ValueError(f'"{method}" has no error estimate: give it a step')
-        if not (rtol >= 0 and atol >= 0 and rtol + atol > 0):
-            raise ValueError("rtol and atol must be at least 0, one of them above 0")
-        if step is not None and not 0 < step < math.inf:
-            raise ValueError(f"step must be above 0, not {step:g}")
+        if not (0 <= rtol < 1 and atol >= 0 and rtol + atol > 0):
+            raise ValueError("rtol must lie in 0 ... 1 and atol be at least 0, one of them above 0")
+        if step is not None:
+            fixed(span, step, max_steps)
         kernel = _kernel(f, starts.shape[1], len(given), method)
         if kernel is not None:
             return _in_lanes(

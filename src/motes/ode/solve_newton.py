@@ -14,7 +14,7 @@ from motes.integrate import method as find
 from motes.ode import newton, right_hand_side
 from motes.ode.march import Room
 from motes.ode.right_hand_side import FirstOrder, OfBoth
-from motes.ode.run import Machine, March, as_events, asked, checked, fixed
+from motes.ode.run import Machine, March, as_events, asked, checked, fixed, numbers
 from motes.ode.solution import Event, NewtonSolution
 from motes.ode.solve import MOST_STEPS, solve
 from motes.tableau import Nystrom, Splitting
@@ -70,7 +70,7 @@ def solve_newton(
         ValueError: a step, rate or time that makes no sense, or a method that cannot do this.
     """
     table = find(method)
-    x, v = np.array(x0, float), np.array(v0, float)
+    x, v = numbers(x0, "x0"), numbers(v0, "v0")
     if x.shape != v.shape:
         raise ValueError(f"x0 has shape {x.shape}, but v0 has {v.shape}")
     shape, both = (2, *x.shape), np.stack([x, v])
@@ -115,7 +115,12 @@ _SHARED = (
 def _rates(
     method: str, table: Splitting | Nystrom, drag: ArrayLike, shape: tuple[int, ...]
 ) -> np.ndarray[Any, np.dtype[np.float64]]:
-    rates = np.broadcast_to(np.asarray(drag, float), shape).reshape(-1).copy()
+    given = numbers(drag, "drag")
+    if given.shape not in ((), shape):
+        raise ValueError(
+            f"drag must be a number or have the shape of x0, {shape}, not {given.shape}"
+        )
+    rates = np.broadcast_to(given, shape).reshape(-1).copy()
     if not (np.isfinite(rates) & (rates >= 0)).all():
         raise ValueError("drag must be finite and at least 0")
     if isinstance(table, Nystrom) or min(*table.kicks, *table.drifts) < 0 or table.order > 2:
