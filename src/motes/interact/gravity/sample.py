@@ -67,7 +67,9 @@ class Sample:
         counts = self.ranges[:, 1] - self.ranges[:, 0]
         sums = np.add.reduceat(self.weight * more**2, np.cumsum(counts) - counts)
         variance = 0.0
-        for first, last, chance in zip(self.classes[:-1], self.classes[1:], self.chance, strict=True):
+        for first, last, chance in zip(
+            self.classes[:-1], self.classes[1:], self.chance, strict=True
+        ):
             if chance:
                 variance += chance * (last - first) * sums[first:last].var(ddof=1)
         square = (sums.sum() + DEVIATIONS * math.sqrt(variance)) / self.weight.sum()

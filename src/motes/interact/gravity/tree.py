@@ -179,7 +179,17 @@ def octree(points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int)
         len(ranges),
     )
     nothing = np.empty((0, 0))
-    return Tree(_leaves(cells), cells, np.empty((len(cells), 5)), nothing, nothing, order, place, nothing, nothing)
+    return Tree(
+        _leaves(cells),
+        cells,
+        np.empty((len(cells), 5)),
+        nothing,
+        nothing,
+        order,
+        place,
+        nothing,
+        nothing,
+    )
 
 
 def _cells(key: NDArray[np.uint64], leaf: int, coarse: int) -> NDArray[np.int32]:
