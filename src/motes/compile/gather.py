@@ -77,7 +77,8 @@ class Gathering:
     def prepare(self, real: type) -> None:
         """Compile, or see that the kernel cache has it, without any particles."""
         some: NDArray[Any] = np.zeros(1, real)
-        rows, three = np.zeros(1, np.int32), np.zeros((3, 1), real)
+        three: NDArray[Any] = np.zeros((3, 1), real)
+        rows = np.zeros(1, np.int32)
         whole = np.ones(3, np.int64)
         cut = Grid(np.zeros(3), np.ones(3), whole, whole < 0, np.ones(3, real))
         cells = Cells(three, rows, np.zeros(1, np.uint64), rows, np.uint64(0))

@@ -59,6 +59,8 @@ def _nearest(hunters: Any, prey: Any, radius: float) -> tuple[Any, Any]:
     around = np.flatnonzero(((low <= prey.T) & (high >= prey.T)).all(axis=1))
     if not around.size:
         return nobody, nobody
+    i: Any
+    found: Any
     if hunters.shape[1] * around.size <= FEW:
         way = hunters[:, :, None] - prey[:, None, around]
         i, found = np.nonzero((way * way).sum(axis=0) <= radius * radius)
