@@ -247,17 +247,52 @@ def test_senseless_arguments_are_refused(change, message):
 
 @pytest.mark.parametrize("wrong", [lambda t, y: (1.0,) * 3, lambda t, y: y[0], lambda t, y: ()])
 def test_a_function_of_another_shape_is_told_so(wrong):
-    message = r"gave \d numbers, shape .* for a state of 2, shape \(2"
+    message = r"gave \d numbers?, shape .* for a state of 2, shape \(2"
     for state in (np.ones(2), np.ones((2, 1))):
         with pytest.raises(ValueError, match=message):
             ode.solve(wrong, state, (0.0, 1.0), method="rk4", step=0.1)
 
 
-def test_a_compiled_function_of_another_shape_gives_no_solution():
+@pytest.mark.parametrize("method", ["rk4", "radau5"])
+def test_a_compiled_function_of_another_shape_is_told_so(method):
+    """Whether it gives more numbers, fewer, or none, as an array or a tuple."""
+
     @njit
     def short(t, y):
         return np.array([1.0])
 
-    solution = ode.solve(short, np.ones(2), (0.0, 1.0), method="rk4", step=0.1)
-    assert solution.t[-1] == 0.0
-    assert "became infinite" in solution.message
+    @njit
+    def long(t, y):
+        return 1.0, 2.0, 3.0
+
+    @njit
+    def nothing(t, y):
+        pass
+
+    wrong = [(short, "gave 1 number, "), (long, "gave 3 numbers, "), (nothing, "gave nothing")]
+    for f, message in wrong:
+        with pytest.raises(ValueError, match=message):
+            ode.solve(f, np.ones(2), (0.0, 1.0), method=method, step=0.1)
+    with pytest.raises(ValueError, match="gave 1 number, "):
+        ode.solve(short, np.ones((1, 2)), (0.0, 1.0), method=method, step=0.1)
+
+
+def test_arguments_that_a_compiled_function_lacks_are_told():
+    @njit
+    def decay(t, y, rate):
+        return -rate * y
+
+    with pytest.raises(ValueError, match="missing a required argument: 'rate'"):
+        ode.solve(decay, np.ones(2), (0.0, 1.0))
+    with pytest.raises(ValueError, match="args must be a tuple"):
+        ode.solve(decay, np.ones(2), (0.0, 1.0), args=2.0)
+
+
+def test_events_that_are_none_are_refused():
+    for events, message in (
+        (None, "events must be a list"),
+        ([3], "a function g"),
+        ([ode.Event(circle, direction=7)], "-1, 0 or 1"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            ode.solve(circle, [1.0, 0.0], (0, 1), events=events)

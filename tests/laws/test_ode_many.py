@@ -76,3 +76,24 @@ def test_a_system_that_explodes_fails_alone():
     r = ode.solve_many(square, [[0.1], [1.0], [0.2]], (0, 2))
     assert r.success.tolist() == [True, False, True]
     assert r.y[[0, 2], 0, 0] == pytest.approx([1 / 8, 1 / 3], rel=1e-5)
+
+
+def test_a_compiled_function_of_another_shape_or_without_a_number_at_the_start_ends():
+    @njit
+    def long(t, y):
+        return 1.0, 2.0, 3.0
+
+    @njit
+    def short(t, y):
+        return (1.0,)
+
+    @njit
+    def bottomless(t, y):
+        return np.nan, y[1]
+
+    for f, message in ((long, "gave 3 numbers, "), (short, "gave 1 number, ")):
+        with pytest.raises(ValueError, match=message):
+            ode.solve_many(f, np.ones((5, 2)), (0, 1))
+    found = ode.solve_many(bottomless, np.ones((5, 2)), (0, 1))
+    assert not found.success.any()
+    assert found.steps.max() == 0

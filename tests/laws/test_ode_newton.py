@@ -225,3 +225,18 @@ def test_events_of_second_order_systems_see_position_and_velocity():
     )  # fmt: skip
     assert r.t[-1] == pytest.approx(np.pi, abs=1e-5)
     assert r.events[0].y[0, 0] == pytest.approx([-1.5, 0], abs=1e-5)
+
+
+@pytest.mark.parametrize("method", ["leapfrog", "nystrom5", "rk4"])
+def test_a_compiled_acceleration_of_another_shape_is_told_so(method):
+    @njit
+    def short(t, x, v):
+        return np.array([1.0])
+
+    @njit
+    def long(t, x, v):
+        return 1.0, 2.0, 3.0
+
+    for f, message in ((short, "gave 1 number, "), (long, "gave 3 numbers, ")):
+        with pytest.raises(ValueError, match=message):
+            ode.solve_newton(f, np.ones(2), np.ones(2), (0, 1), method=method, step=0.1)

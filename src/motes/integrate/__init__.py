@@ -26,7 +26,7 @@ def method(name: str) -> Table:
     """A method by name, for scenes and for `motes.ode`. Raises SceneError with the menu."""
     if name not in names():
         raise SceneError(
-            f'no integrator "{name}".{likely(name, names())} There are: {", ".join(names())}.'
+            f'no integrator "{name}".{likely(str(name), names())} There are: {", ".join(names())}.'
         )
     found: Table = importlib.import_module(f"{__name__}.{name}").method
     return found

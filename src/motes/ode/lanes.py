@@ -22,6 +22,9 @@ from motes.tableau import Explicit
 LANES = 32
 """Systems side by side: latencies of some hide behind the others."""
 
+SHORTEST = 1e-300
+"""A step that is no longer leads nowhere, at time 0 either."""
+
 
 class Batch(NamedTuple):
     """States and steps of many systems, one column each; a march goes on from what it finds."""
@@ -179,9 +182,8 @@ def march(f: Any, size: int, arguments: int, table: Explicit) -> Kernel:
                 taken[lane] += 1.0 if good else 0.0
                 refused[lane] += 0.0 if good else 1.0
                 t[lane] = reach if good else t[lane]
-                stuck = (
-                    abs(now[lane]) < 4e-16 * abs(t[lane]) or taken[lane] + refused[lane] >= limit
-                )
+                stuck = not abs(now[lane]) >= max(4e-16 * abs(t[lane]), SHORTEST)
+                stuck = stuck or taken[lane] + refused[lane] >= limit
                 done[lane] = t[lane] == t1 or stuck
                 idle = idle or (done[lane] and system[lane] >= 0)
             if not idle:
@@ -215,9 +217,12 @@ def _slope(f: Any, size: int, arguments: int) -> Kernel:
         "def slope(t, y, a, out, width):",
         "    for lane in range(width):",
         f"        value = f(t[lane], ({state}){further})",
-        *(f"        out[{c}, lane] = value[{c}]" for c in range(size)),
+        f"        if len(value) == {size}:",
+        *(f"            out[{c}, lane] = value[{c}]" for c in range(size)),
+        "        else:",  # Of another shape than the state: no solution.
+        *(f"            out[{c}, lane] = math.nan" for c in range(size)),
     ]
-    return _made(lines, "slope", {"f": jit(f.py_func, flags=EXACT, inline=True)})
+    return _made(lines, "slope", {"f": jit(f.py_func, flags=EXACT, inline=True), "math": math})
 
 
 def _combination(rows: Sequence[Sequence[float]]) -> Kernel:

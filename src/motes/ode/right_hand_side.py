@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +28,10 @@ class FirstOrder:
 
     def __call__(self, t: Any, y: Any, *args: Any) -> Any:
         """y' as one array."""
-        return np.stack([y[1], np.reshape(self.acceleration(t, *y, *args), self.shape)])
+        value = np.asarray(self.acceleration(t, *y, *args))
+        if value.size != math.prod(self.shape):
+            raise misfit(value, self.shape)
+        return np.stack([y[1], value.reshape(self.shape)])
 
 
 @dataclass(frozen=True)
@@ -114,17 +118,51 @@ def slope(f: Function, shape: tuple[int, ...]) -> Kernel:
         return jit(vector)
 
     def block(t, y, w, row, args):  # type: ignore[no-untyped-def]
-        w[row * size : (row + 1) * size] = f(t, y.reshape(shape), *args).ravel()
+        value = f(t, y.reshape(shape), *args).ravel()
+        if value.size == size:
+            w[row * size : (row + 1) * size] = value
+        else:
+            w[row * size : (row + 1) * size] = np.nan
 
     return jit(block)
 
 
 def misfit(value: Any, shape: tuple[int, ...]) -> ValueError:
     """What is said of a function that gives another shape than its state's."""
+    count = np.size(value)
     return ValueError(
-        f"the function gave {np.size(value)} numbers, shape {np.shape(value)}, for a state of "
-        f"{math.prod(shape)}, shape {shape}"
+        f"the function gave {count} number{'s' * (count != 1)}, shape {np.shape(value)}, for a "
+        f"state of {math.prod(shape)}, shape {shape}"
     )
+
+
+def refuse(f: Function, shape: tuple[int, ...], t: float, *given: Any) -> None:
+    """Raise what is wrong with a compiled function, where a solve could not even begin.
+
+    It is called once as plain Python, at a time with what is given; solves that begin pay nothing.
+
+    Raises:
+        ValueError: it gives nothing, another shape than its state's, or does not take so many
+            arguments.
+    """
+    if isinstance(f, FirstOrder):
+        shape, given = f.shape, (*given[0], *given[1:])
+        f = f.acceleration
+    plain = getattr(f, "py_func", f)
+    try:
+        signature(plain).bind(t, *given)
+    except TypeError as fault:
+        raise ValueError(
+            f"the function cannot be called with t, a state and args: {fault}"
+        ) from None
+    try:
+        value = plain(t, *given)
+    except Exception:
+        return  # What machine code makes of it, such as an infinite number, has been said.
+    if value is None:
+        raise ValueError("the function gave nothing; it must return the slope of its state")
+    if np.size(value) != math.prod(shape) or (np.shape(value) and not shape):
+        raise misfit(value, shape)
 
 
 def _slope_of_both(f: FirstOrder, size: int) -> Kernel:
@@ -161,13 +199,21 @@ def acceleration(f: Function, shape: tuple[int, ...], skip: int) -> Kernel:
 
         def vector(t, x, v, out, args):  # type: ignore[no-untyped-def]
             value = f(t, x, v, *args[skip:])
-            for i in range(size):
-                out[i] = value[i]
+            if len(value) == size:
+                for i in range(size):
+                    out[i] = value[i]
+            else:
+                for i in range(size):
+                    out[i] = np.nan
 
         return jit(vector)
 
     def block(t, x, v, out, args):  # type: ignore[no-untyped-def]
-        out[:] = f(t, x.reshape(shape), v.reshape(shape), *args[skip:]).ravel()
+        value = f(t, x.reshape(shape), v.reshape(shape), *args[skip:]).ravel()
+        if value.size == out.size:
+            out[:] = value
+        else:
+            out[:] = np.nan
 
     return jit(block)
 

@@ -66,8 +66,23 @@ class March:
     states: list[Array] = field(default_factory=list)
     found: list[tuple[Array, Array, Array]] = field(default_factory=list)
 
-    def run(self) -> None:
-        """Step to the end, a terminal event, or where no step can be found."""
+    def run(self, refuse: Callable[[], None]) -> None:
+        """Step to the end, a terminal event, or where no step can be found.
+
+        `refuse` raises what is wrong with the user's compiled function, if anything is: it is
+        called where that cannot be compiled, or not one step could be taken.
+        """
+        try:
+            self._run()
+        except Exception:
+            if isinstance(self.machine.advance, jit.Kernel):
+                refuse()
+            raise
+        ended = self.counts[march.STATUS]
+        if self.counts[march.STEPS] == 0 and ended in (march.INFINITE, march.TOO_SMALL):
+            refuse()
+
+    def _run(self) -> None:
         size, events, start = self.y.size, len(self.events), self.control.start
         self.clock = np.array([start, self.first, 0.0])
         self.counts = counts = np.zeros(9, np.int64)
@@ -241,7 +256,32 @@ def _quiet() -> AbstractContextManager[Any]:
 
 def as_events(events: Sequence[Event | Callable[..., Any]]) -> tuple[Event, ...]:
     """Plain functions as events of both directions that end nothing."""
-    return tuple(event if isinstance(event, Event) else Event(event) for event in events)
+    try:
+        found = tuple(event if isinstance(event, Event) else Event(event) for event in events)
+    except TypeError:
+        raise ValueError(f"events must be a list of functions, not {events!r}") from None
+    for event in found:
+        if not callable(event.function):
+            raise ValueError(f"an event must be a function g(t, y, *args), not {event.function!r}")
+        if event.direction not in (-1, 0, 1):
+            raise ValueError(f"an event's direction must be -1, 0 or 1, not {event.direction!r}")
+    return found
+
+
+def further(args: Any) -> tuple[Any, ...]:
+    """Further arguments of a function, once they are known to be a tuple or list."""
+    if not isinstance(args, tuple | list):
+        raise ValueError(f"args must be a tuple, such as (1.0,), not {args!r}")
+    return tuple(args)
+
+
+def counted(limit: float) -> int:
+    """A number of steps, once it is known to be one."""
+    if not isinstance(limit, SupportsFloat) or not (
+        float(limit) >= 1 and float(limit).is_integer()
+    ):
+        raise ValueError(f"max_steps must be a whole number of at least 1, not {limit!r}")
+    return int(limit)
 
 
 def numbers(values: ArrayLike, name: str) -> Array:

@@ -17,14 +17,17 @@ from motes.ode.arithmetic import Array
 from motes.ode.implicit_frame import EXACTLY
 from motes.ode.jacobian import Newton, NewtonKey
 from motes.ode.march import Control
+from motes.ode.right_hand_side import refuse
 from motes.ode.run import (
     Machine,
     March,
     as_events,
     asked,
     checked,
+    counted,
     ends,
     fixed,
+    further,
     numbers,
     positive,
 )
@@ -90,7 +93,7 @@ def solve(
     start = numbers(y0, "y0")
     checked(start, "y0")
     shape = start.shape
-    watched = as_events(events)
+    watched, args, max_steps = as_events(events), further(args), counted(max_steps)
     table = find(method)
     tolerances = _tolerances(atol, shape)
     if step is not None:
@@ -115,10 +118,10 @@ def solve(
     else:
         machine = _explicit(f, shape, method, functions)
     march = March(
-        machine, control, checked(start, "y0"), tolerances, watched, tuple(args),
+        machine, control, checked(start, "y0"), tolerances, watched, args,
         asked(at, span), dense or at is None, first_step or 0.0, inner,
     )  # fmt: skip
-    march.run()
+    march.run(lambda: refuse(f, shape, ends(span)[0], start[()], *args))
     t, y = march.mesh() if at is None else march.answered()
     return Solution(
         **vars(march.work(shape)), t=t, y=y.reshape((-1, *shape)), events=march.crossings(shape),

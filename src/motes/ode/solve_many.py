@@ -15,8 +15,8 @@ from motes.integrate import method as find
 from motes.jit import blocks, share
 from motes.ode import lanes
 from motes.ode.arithmetic import Array, Kernel
-from motes.ode.right_hand_side import compiled
-from motes.ode.run import asked, ends, fixed, numbers
+from motes.ode.right_hand_side import compiled, refuse
+from motes.ode.run import asked, counted, ends, fixed, further, numbers
 from motes.ode.solve import MOST_STEPS, solve
 from motes.tableau import Explicit
 
@@ -93,7 +93,8 @@ def solve_many(
     starts = numbers(y0s, "y0s")
     if starts.ndim == 0:
         raise ValueError("y0s must be (m, ...): one initial state for each system")
-    given = [numbers(arg, "an argument") for arg in args]
+    max_steps = counted(max_steps)
+    given = [numbers(arg, "an argument") for arg in further(args)]
     for arg in given:
         if arg.shape not in ((), (len(starts),)):
             raise ValueError(f"an argument is a number or ({len(starts)},), not {arg.shape}")
@@ -115,9 +116,13 @@ def solve_many(
             fixed(span, step, max_steps)
         kernel = _kernel(f, starts.shape[1], len(given), method)
         if kernel is not None:
-            return _in_lanes(
+            found = _in_lanes(
                 kernel, starts, ends(span)[0], times, given, step, rtol, atol, max_steps
             )
+            for lost in np.flatnonzero(~found.success & (found.steps == 0))[:1]:
+                own = [float(arg[lost] if arg.ndim else arg) for arg in given]
+                refuse(f, starts.shape[1:], ends(span)[0], tuple(starts[lost]), *own)
+            return found
     options = {"method": method, "step": step, "rtol": rtol, "atol": atol, "max_steps": max_steps}
     return _one_by_one(f, starts, span, times, given, options)
 

@@ -13,8 +13,19 @@ from numpy.typing import ArrayLike
 from motes.integrate import method as find
 from motes.ode import newton, right_hand_side
 from motes.ode.march import Room
-from motes.ode.right_hand_side import FirstOrder, OfBoth
-from motes.ode.run import Machine, March, as_events, asked, checked, fixed, numbers
+from motes.ode.right_hand_side import FirstOrder, OfBoth, refuse
+from motes.ode.run import (
+    Machine,
+    March,
+    as_events,
+    asked,
+    checked,
+    counted,
+    ends,
+    fixed,
+    further,
+    numbers,
+)
 from motes.ode.solution import Event, NewtonSolution
 from motes.ode.solve import MOST_STEPS, solve
 from motes.tableau import Nystrom, Splitting
@@ -74,6 +85,7 @@ def solve_newton(
     if x.shape != v.shape:
         raise ValueError(f"x0 has shape {x.shape}, but v0 has {v.shape}")
     shape, both = (2, *x.shape), np.stack([x, v])
+    args, max_steps = further(args), counted(max_steps)
     watched = tuple(dataclasses.replace(e, function=OfBoth(e.function)) for e in as_events(events))
     if not isinstance(table, Splitting | Nystrom):
         if drag is not None:
@@ -98,7 +110,7 @@ def solve_newton(
         machine, fixed(span, step, max_steps), checked(both, "x0 and v0"), np.ones(both.size),
         watched, (*rates, *args), asked(at, span), dense or at is None, 0.0,
     )  # fmt: skip
-    march.run()
+    march.run(lambda: refuse(acceleration, x.shape, ends(span)[0], x[()], v[()], *args))
     t, y = march.mesh() if at is None else march.answered()
     y = y.reshape((-1, *shape))
     return NewtonSolution(
