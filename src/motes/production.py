@@ -40,8 +40,9 @@ STILLS = 6
 HELD = 1 << 28
 """Most memory of frames that wait until the first still is drawn [bytes]."""
 
-PATIENCE = 2.0
-"""Time after which a first picture is drawn, though the first still is not reached [s]."""
+PATIENCE, LEAST, EARLY = 2.0, 0.5, 5.0
+"""A first picture is drawn after `PATIENCE` of simulating frames [s], though the first still is not
+reached; after `LEAST`, if `EARLY` have passed since all began."""
 
 WAITING = 3
 """Frames that may wait for the disk and the encoder; more would only use memory."""
@@ -90,7 +91,7 @@ def film(
     """
     from motes.simulation import Simulation
 
-    report = Report(watch)
+    report, begun = Report(watch), time.monotonic()
     with Rehearsal(scene) as rehearsal, report.compiling(rehearsal.begin if draw else None):
         simulation = Simulation(scene)
         numbers = _numbers(first, last, range(1, simulation.frame_count + 1))
@@ -100,7 +101,7 @@ def film(
             frames = _kept(simulation, numbers, store, follower, report)
             if draw:
                 path = Path(folder) / f"{name}.{form}"
-                sheet = _draw(frames, numbers, scene, path, follower, report, rehearsal)
+                sheet = _draw(frames, numbers, scene, path, follower, report, begun, rehearsal)
                 return Made(path, sheet, store.folder, len(simulation.captures))
             for _ in frames:
                 report.finished()
@@ -132,13 +133,13 @@ def redraw(
     scene = from_document(document, source=str(store.folder / "manifest.json"))
     scene = scene.with_values(values or {})
     numbers = _numbers(first, last, store.numbers())
-    report = Report(watch)
+    report, begun = Report(watch), time.monotonic()
     report.begin(len(numbers))
     target = Path(output) if output is not None else store.folder.parent
     path = target / f"{store.manifest.name}.{form}"
     with report.compiling(), _Follower() as follower:
         frames = report.counted(store.read(number) for number in numbers)
-        sheet = _draw(frames, numbers, scene, path, follower, report)
+        sheet = _draw(frames, numbers, scene, path, follower, report, begun)
     return Made(path, sheet, store.folder)
 
 
@@ -204,6 +205,7 @@ def _draw(
     path: Path,
     follower: _Follower,
     report: Report,
+    begun: float,
     rehearsal: Rehearsal | None = None,
 ) -> Path:
     """Draw frames into a film at `path`; gives its contact sheet, until then the first still."""
@@ -223,7 +225,7 @@ def _draw(
 
     with Video(path, fps=scene.film.fps) as video, follower.emptied():
         frames = iter(frames)
-        ahead = _ahead(frames, min(chosen))
+        ahead = _ahead(frames, min(chosen), begun)
         if rehearsal is not None:
             # By now this process has compiled what simulates; it compiles nothing twice.
             rehearsal.wait()
@@ -237,10 +239,11 @@ def _draw(
     return sheet
 
 
-def _ahead(frames: Iterable[Frame], still: int) -> list[Frame]:
+def _ahead(frames: Iterable[Frame], still: int, begun: float) -> list[Frame]:
     """The frames up to the first still, or as many as may wait in memory and be waited for."""
     held: list[Frame] = []
-    room, late = HELD, time.monotonic() + PATIENCE
+    room, now = HELD, time.monotonic()
+    late = min(now + PATIENCE, max(now + LEAST, begun + EARLY))
     for frame in frames:
         held.append(frame)
         room -= sum(a.nbytes for columns in frame.systems.values() for a in columns.values())

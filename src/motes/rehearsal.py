@@ -94,19 +94,11 @@ def frame_of(scene: Scene) -> Frame:
 
 
 def main() -> None:
-    """Draw the scene whose document comes on stdin.
-
-    First compile the longest kernels that simulate, of laws without lists: the first process needs
-    them once some others are compiled.
-    """
+    """Draw the scene whose document comes on stdin."""
     from motes.scene import from_document
-    from motes.simulation import Simulation
     from motes.studio import Studio
 
     scene = from_document(json.load(sys.stdin))
-    for group in Simulation(scene)._groups:
-        if group.nearby.swarm is not None:
-            group.nearby.swarm.prepare()
     _ = Studio(scene, size=SIZE).draw(frame_of(scene)).pixels
 
 
