@@ -58,14 +58,14 @@ def scene(
     return motes.Scene(systems=[system], solid=solids, step=STEP, integrator=integrator)
 
 
-def stepping(document: motes.Scene, steps: int) -> Task:
-    """A simulation's next steps."""
+def stepping(document: motes.Scene, steps: int, one_by_one: bool = False) -> Task:
+    """A simulation's next steps; `one_by_one` keeps it from taking several in one pass."""
     simulation = motes.Simulation(document)
     simulation.run(steps=2)
 
     def run() -> float:
         work, start = simulation.work, time.perf_counter()
-        simulation.run(steps=steps)
+        simulation.run(steps=steps, progress=(lambda _: None) if one_by_one else None)
         return (simulation.work - work) / (time.perf_counter() - start) / 1e6
 
     return run
@@ -180,16 +180,18 @@ def main() -> None:
         for name, rate in zip(tasks, fastest(*tasks.values(), rounds=rounds), strict=True):
             report.figures[name] = rate, "M/s"
 
-    grounded = "motes, ground and births"
+    grounded, single = "motes, ground and births", "motes, step by step"
     race(
         rounds,
         {
             "bare update": bare(n),
             "motes": stepping(scene(n), steps),
+            single: stepping(scene(n), steps, one_by_one=True),
             grounded: stepping(scene(n, ground=True), steps // 5),
         },
     )
     report.ratio("motes", "bare update")
+    report.ratio(single, "bare update")
     report.ratio(grounded, "bare update")
     for m in (few, n):
         for method in ("semi_implicit_euler", "rk4"):

@@ -76,6 +76,14 @@ class Clock:
             result.append(Source(self._number, k.astype(np.uint64), times))
         return result
 
+    def silent(self, begin: float, end: float) -> bool:
+        """Whether `sources` gives none."""
+        first = begin <= self.start
+        for time, _, _ in self._bursts:
+            if begin < time <= end or (first and time <= begin):
+                return False
+        return bool(np.floor(self._integral(begin)) == np.floor(self._integral(end)))
+
     def numbers(self, ids: NDArray[np.uint64], time: float) -> NDArray[np.int64]:
         """Which births particles are (2, n): number of the stream and k, -1 for other emitters'.
 

@@ -8,7 +8,9 @@ another that it could feel.
 
 from __future__ import annotations
 
+import math
 import operator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +34,10 @@ MANY = 2048
 
 NOTHING: NDArray[np.int64] = np.zeros(0, np.int64)
 """No rows."""
+
+
+ROUNDED = 1e-5
+"""Share of an age by which single precision may be wrong, with some to spare."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +75,39 @@ class Stepper:
         self.exceptions(rows, exceptional, interval)
         self.events()
         self.deaths(rows, exceptional, interval)
+
+    def undisturbed(self, rows: Particles, begin: float, end: float, step: float) -> bool:
+        """Whether nothing is born, dies or meets a solid in some steps: rows only move."""
+        if self.system.surfaces is not None or end >= self._first_death(rows, step):
+            return False
+        return all(clock.silent(begin, end) for clock in self.clocks)
+
+    def _first_death(self, rows: Particles, step: float) -> float:
+        """A time before which nobody dies, as far as that is known without a look at all rows.
+
+        Rows are in the order of the steps in which they were born, so that nobody is older than the
+        first one by more than a step.
+        """
+        motion = self.system.motion
+        if not motion.mortal or rows.count == 0:
+            return math.inf
+        if any(component.type != "lifetime" for _, component in motion.retire):
+            return -math.inf
+        shortest = motion.traits["life"][1].bounds()[0]
+        return float(rows.birth[0]) - 2 * step + shortest * (1 - ROUNDED)
+
+    def glide(self, rows: Particles, intervals: Sequence[Interval]) -> None:
+        """Take undisturbed rows through several steps, in place.
+
+        A block of rows goes through all of them while it is in a cache, and then the next one.
+        """
+        step, parts = self._bound(self.system.straight, rows), _parts(rows.count, 1)
+
+        def straight(k: int) -> None:
+            for interval in intervals:
+                step(interval.begin, interval.end, *parts[k])
+
+        share(straight, len(parts))
 
     def mass(self, rows: Particles, alive: int) -> NDArray[Any]:
         """Masses [kg] of the rows that were alive, (alive,)."""

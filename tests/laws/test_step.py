@@ -47,6 +47,28 @@ def test_the_result_does_not_depend_on_the_number_of_threads() -> None:
     assert len(digests) == 1
 
 
+@pytest.mark.parametrize("life", [None, 0.37, {"mean": 0.4, "spread": 0.1}])
+def test_steps_that_are_taken_together_are_those_taken_one_by_one(life: Any) -> None:
+    """The same bits, with a burst on the way, a rate that begins later, deaths, two systems."""
+
+    def dust(name: str, *emitters: Any, life: Any = None) -> motes.System:
+        force = [motes.force.Gravity(), motes.force.Drag(), motes.force.Turbulence()]
+        return motes.System(name, emit=list(emitters), force=force, life=life)
+
+    early = motes.emit.Box(burst=[{"at": 0.0, "count": 30_000}, {"at": 0.233, "count": 1_000}])
+    late = motes.emit.Cone(rate={"over": "time", "keys": [[0.4, 0.0], [0.45, 900.0]]})
+    systems = [dust("a", early, life=life), dust("b", early, late)]
+    scene = motes.Scene(systems=systems, step=0.01)
+    together, one_by_one = motes.Simulation(scene), motes.Simulation(scene)
+    together.run(steps=60)
+    for _ in range(60):
+        one_by_one.step()
+    assert together.count > (62_005 if life is None else 31_005)
+    assert together.work == one_by_one.work
+    assert together.time == one_by_one.time
+    assert together.digest() == one_by_one.digest()
+
+
 def cloud(force: list[Any], precision: str) -> motes.Simulation:
     """A thousand particles that do not move yet, at rest in a box."""
     box = motes.emit.Box(burst=[{"at": 0.0, "count": 1000}], size=(2, 2, 2), position=(0.5, 0, 0))
