@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from motes.machine.ahead import MARK
 from motes.machine.block import literal
 from motes.machine.kinds import (
     BOOL,
@@ -18,7 +17,6 @@ from motes.machine.kinds import (
     INT,
     INT32,
     NUMBERS,
-    UINT,
     Array,
     Number,
     Unsupported,
@@ -231,21 +229,6 @@ class Calls(Many):
             return Scalar(kind, value.text)
         return Scalar(kind, self.do(f"bitcast {value.type.llvm} {value.text} to {kind.llvm}"))
 
-    def bits(self, condition: Value) -> Value:
-        """`lanes.bits`."""
-        truth = self.truth(condition)
-        lanes = truth.type.lanes
-        whole = truth.text
-        if lanes > 1:
-            whole = self.do(f"bitcast {truth.type.llvm} {truth.text} to i{lanes}")
-        return Scalar(UINT, self.do(f"zext i{lanes} {whole} to i64"))
-
-    def lowest(self, number: Value) -> Value:
-        """`lanes.lowest`."""
-        self.declare("declare i64 @llvm.cttz.i64(i64, i1)")
-        whole = self.cast(self._number(number), UINT).text
-        return Scalar(UINT, self.do(f"call i64 @llvm.cttz.i64(i64 {whole}, i1 true)"))
-
     def empty(self, shape: Value, kind: Value = Known(np.float64)) -> Value:  # noqa: B008
         """numpy.empty: room that the call has for itself; its numbers are not set."""
         item = of_dtype(np.dtype(_thing(kind)))
@@ -288,11 +271,6 @@ class Calls(Many):
         assert isinstance(array, View)
         self.fill(array, literal(0, array.type.item))
         return array
-
-    def streams(self) -> Value:
-        """`lanes.streams`."""
-        self.declare(MARK)
-        return Known(None)
 
     def heap(self, bytes: str) -> str:
         """Address of memory that is given back when the function returns."""

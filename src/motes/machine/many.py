@@ -4,14 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from motes.machine.kinds import INT, SINGLE, Number, Unsupported
+from motes.machine.ahead import MARK
+from motes.machine.kinds import INT, SINGLE, UINT, Number, Unsupported
 from motes.machine.memory import Memory
 from motes.machine.shuffles import LANES, order_table
-from motes.machine.values import Scalar, Value, View
+from motes.machine.values import Known, Scalar, Value, View
 
 
 class Many(Memory):
-    """What kernels call to compare, sum and keep lanes."""
+    """What kernels call to compare, sum, mark and keep lanes."""
+
+    def streams(self) -> Value:
+        """`lanes.streams`."""
+        self.declare(MARK)
+        return Known(None)
+
+    def bits(self, condition: Value) -> Value:
+        """`lanes.bits`."""
+        truth = self.truth(condition)
+        lanes = truth.type.lanes
+        whole = truth.text
+        if lanes > 1:
+            whole = self.do(f"bitcast {truth.type.llvm} {truth.text} to i{lanes}")
+        return Scalar(UINT, self.do(f"zext i{lanes} {whole} to i64"))
+
+    def lowest(self, number: Value) -> Value:
+        """`lanes.lowest`."""
+        self.declare("declare i64 @llvm.cttz.i64(i64, i1)")
+        if not isinstance(number, Scalar):
+            raise Unsupported("the lowest bit of anything but a number")
+        whole = self.cast(number, UINT).text
+        return Scalar(UINT, self.do(f"call i64 @llvm.cttz.i64(i64 {whole}, i1 true)"))
 
     def choose(self, condition: Value, one: Value, other: Value) -> Value:
         """`lanes.choose`."""
