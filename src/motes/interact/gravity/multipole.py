@@ -47,6 +47,10 @@ ENOUGH = 5.0
 EASIER = 8.0
 """How many times less an expansion of the lower order may neglect: there are many of them."""
 
+FAR = 0.7
+"""Part of what may be at which one tries again; from there on what is left is used up untried, as
+the error grows at most in proportion."""
+
 TRIALS = 8
 """Trials before all is summed by pairs."""
 
@@ -81,8 +85,9 @@ def plan(tolerance: float, law: str) -> Plan:
     """Order, leaf size and precision that are fast at a tolerance, found by measurement."""
     digits = -math.log10(tolerance)
     real = np.float32 if tolerance >= SINGLE_FROM else np.float64
-    order = min(max(2, int(1.3 * digits + 1.5)), HIGHEST[law != "plummer"])
-    return Plan(order, max(order - 2, 1), leaf=32 if digits < 4 else 48, real=real)
+    order = min(max(2, int(2 * digits - 0.99)), HIGHEST[law != "plummer"])
+    leaf = 48 if digits > 4.2 and real is np.float32 else 32
+    return Plan(order, max(int(0.72 * order), 1), leaf, real)
 
 
 def multipole(
@@ -182,9 +187,10 @@ class Problem:
                 exact = self._at(sample, strict)
             part = self._error(sample, self._at(sample, limits), exact) / (SAFETY * tolerance)
             if part <= 1.0:
-                if kept is not None or part > 0.7 or share >= MOST * tolerance:
-                    return limits
-                kept = limits
+                more = min(1 / max(part, FAR), MOST * tolerance / share)
+                kept = limits._replace(error=more * limits.error)
+                if part > FAR or share >= MOST * tolerance:
+                    return kept
             elif kept is not None:
                 return kept
             share *= min(max(0.9 / max(part, 1e-9), 0.05), 3.0)
@@ -217,12 +223,18 @@ class Problem:
         same, largest, out = self.targets is self.sources, self.targets.largest, self.out
         desks: SimpleQueue[Desk] = SimpleQueue()
         for _ in range(threads()):
-            desks.put(desk(operations, self.plan.real, largest, 1 << 16))
+            desks.put(desk(operations, self.law != "plummer", self.plan.real, largest, 1 << 16))
 
         def task(number: int) -> None:
             own = desks.get()
             while walk(self.targets, self.sources, same, parts[number], limits, own, out):
-                own = desk(operations, self.plan.real, largest, 2 * own.candidates.size)
+                own = desk(
+                    operations,
+                    self.law != "plummer",
+                    self.plan.real,
+                    largest,
+                    2 * own.candidates.size,
+                )
             desks.put(own)
 
         share(task, len(parts))

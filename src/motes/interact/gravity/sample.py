@@ -15,10 +15,10 @@ from motes.interact.gravity.tree import END, RADIUS, START, Tree
 LEAVES = 16
 """Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
-LEAVES_OF_A_CLASS = 8
+LEAVES_OF_A_CLASS = 12
 """Target leaves out of each further class, which has twice as many as the one before."""
 
-DEVIATIONS = 2.0
+DEVIATIONS = 2.5
 """Standard errors of a mean square by which it may be larger than the sample says."""
 
 
