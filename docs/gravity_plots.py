@@ -48,6 +48,7 @@ IS_FAR = acceptance(ORDER, ORDER, np.float64)
 
 @jit(numba=False)
 def judge(balls: Any, chosen: Any, mass: Any, own: Any, stricter: Any, found: Any) -> None:
+    """Write whether the chosen cells are far from the ball `own`."""
     far, _, _ = IS_FAR(balls, chosen, read(mass, 0), own, (stricter, stricter), 1.0, 0.0, 0.0)
     write(found, 0, choose(far, 1.0, 0.0))
 
