@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate, pairwise
 from operator import le
 from typing import Any, NamedTuple
 
@@ -22,6 +23,10 @@ from motes.interact.cells import Grid
 from motes.jit import STRICT, Calls, each, jit
 from motes.machine.shuffles import LANES, near_slots, taken_apart
 from motes.memory import afford, allocate
+
+NEAR_CLUSTER, NEAR_PARTICLE, SPARE = 512, 96, 4096
+"""Entries that new lists have room for: of a cluster, of a particle, and of a part besides. They are
+those of a liquid and some more; room that is not written to is no memory yet."""
 
 
 class Part(NamedTuple):
@@ -267,8 +272,9 @@ def cluster_lists(
         targets.real.position, sources.real, sources.ghosts, cut, sources.inner, float(radius)
     )  # fmt: skip
     room.work, room.calls = [], None
-    for k, cluster in enumerate(targets.clusters):
-        first, entry = np.zeros(cluster.size, np.int64), _again(room, k, 400 * cluster.size)
+    entries = _entries(room, [NEAR_CLUSTER * cluster.size for cluster in targets.clusters])
+    for k, (cluster, entry) in enumerate(zip(targets.clusters, entries, strict=True)):
+        first = np.zeros(cluster.size, np.int64)
         room.work.append((k, cluster, _candidates(1024, real), first, entry))
     longest, _ = _carried_out(_seek, head, room)
     found = [Clusters(one[1], one[3], one[4], longest[one[0]]) for one in room.work]
@@ -289,9 +295,10 @@ def particle_lists(
     real = own.dtype.type
     if room.lists is not lists:
         room.lists, room.work, room.calls, room.chosen = lists, [], None, None
+        counts = [int(cluster[-1] - cluster[0]) for cluster, *_ in lists]
+        entries = _entries(room, [NEAR_PARTICLE * many for many in counts])
         for k, (cluster, near_first, near, longest) in enumerate(lists):
-            many = int(cluster[-1] - cluster[0])
-            first, entry = np.zeros(many + 1, np.int64), _again(room, k, 96 * many)
+            first, entry = np.zeros(counts[k] + 1, np.int64), entries[k]
             place = np.empty((3, longest), real)
             room.work.append((k, cluster, near_first, near, place, first, entry))
     most, grown = _carried_out(_choose, (own, others, real(radius) ** 2, itself), room)
@@ -304,9 +311,16 @@ def particle_lists(
     return room.chosen
 
 
-def _again(room: Room, k: int, likely: int) -> NDArray[np.int32]:
-    """Memory for a part's entries: that of before, if there is any."""
-    return room.entries[k] if k < len(room.entries) else np.empty(likely + 4096, np.int32)
+def _entries(room: Room, likely: Sequence[int]) -> list[NDArray[np.int32]]:
+    """Memory for the entries of all parts: that of before, if there is any.
+
+    New memory is one array for all of them: the system gives large arrays in large pages.
+    """
+    if len(room.entries) != len(likely):
+        ends = [0, *accumulate(size + SPARE for size in likely)]
+        whole = allocate((ends[-1],), np.int32, "a list of neighbours")
+        room.entries = [whole[begin:end] for begin, end in pairwise(ends)]
+    return room.entries
 
 
 def _carried_out(kernel: Any, head: Any, room: Room) -> tuple[list[int], bool]:
