@@ -23,10 +23,12 @@ from typing import Any
 
 from motes.errors import OutputError, SceneError
 from motes.files import written_whole
-from motes.pool import available_processors, blocks, even_blocks, share, share_out, threads
+from motes.pool import (
+    BRIEF, available_processors, blocks, even_blocks, share, share_out, threads,
+)  # fmt: skip
 
 __all__ = [
-    "EXACT", "FAST", "STRICT", "Calls", "Kernel", "available_processors", "blocks", "bound",
+    "BRIEF", "EXACT", "FAST", "STRICT", "Calls", "Kernel", "available_processors", "blocks", "bound",
     "cache_folder", "each", "even_blocks", "jit", "listen", "share", "threads",
 ]  # fmt: skip
 

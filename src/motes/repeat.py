@@ -1,32 +1,48 @@
 """Kernel calls that are the same from step to step, so that Python takes their arrays apart once.
 
 A step of a few thousand particles is a few hundred microseconds of machine code in some ten calls,
-each of which would cost ten more for its arguments.
+each of which would cost ten more for its arguments; a relay does several of them in one.
 """
 
 from __future__ import annotations
 
+import ctypes
+from array import array
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from motes.jit import Calls, Kernel, share
-from motes.machine.door import PLAIN, spread
+from motes.machine.door import PLAIN, Door, spread
+from motes.machine.relay import COUNTERS, runner
+from motes.pool import share_phases
 
 NUMBERS = PLAIN | {bool}
 """Types whose equal values are equal arguments."""
+
+Packs = Callable[..., bytes]
 
 
 class Repeat:
     """Calls of a kernel that returns nothing, with the same arrays again and again.
 
     Called with numbers, it calls the kernel with `(*head, *numbers, *tail)` for every tail, on the
-    threads. What does not change is taken apart once.
+    threads, or on this one if they are `brief`. What does not change is taken apart once.
     """
 
-    def __init__(self, kernel: Any, head: Sequence[Any], tails: Calls | Sequence[Any]) -> None:
-        self.kernel, self.head, self.tails = kernel, tuple(head), tails
+    def __init__(
+        self, kernel: Any, head: Sequence[Any], tails: Calls | Sequence[Any], brief: bool = False
+    ) -> None:
+        self.kernel, self.head, self.tails, self.brief = kernel, tuple(head), tails, brief
         self._ids = list(map(id, self.head))
-        self._known: tuple[tuple[type, ...], Callable[..., None]] | None = None
+        self._known: tuple[type, ...] | None = None
+        self._door: Door | None = None
+        self._packs: Packs = lambda *numbers: b""
+        self._run: Callable[..., None] = lambda *numbers: None
+
+    @property
+    def count(self) -> int:
+        """How many calls."""
+        return len(self.tails.tails if isinstance(self.tails, Calls) else self.tails)
 
     def fits(self, kernel: Any, head: Sequence[Any], tails: Calls | Sequence[Any]) -> bool:
         """Whether these are its calls."""
@@ -35,17 +51,21 @@ class Repeat:
 
     def __call__(self, *numbers: float) -> None:
         """Call with these numbers, which are always of the same types, in the middle."""
-        kinds = tuple(map(type, numbers))
-        if self._known is None or self._known[0] != kinds:
-            self._known = kinds, self._prepared(numbers)
-        self._known[1](*numbers)
+        if self._known != tuple(map(type, numbers)):
+            self._prepare(numbers)
+        self._run(*numbers)
 
-    def _prepared(self, numbers: Sequence[float]) -> Callable[..., None]:
+    def packed(self, *numbers: float) -> tuple[Door, bytes] | None:
+        """The kernel's door and the arguments of all calls; None where Numba compiled it."""
+        if self._known != tuple(map(type, numbers)):
+            self._prepare(numbers)
+        return None if self._door is None else (self._door, self._packs(*numbers))
+
+    def _prepare(self, numbers: Sequence[float]) -> None:
+        self._known, self._door = tuple(map(type, numbers)), None
         calls = self.tails if isinstance(self.tails, Calls) else Calls(self.tails)
         tails, kernel, head = calls.tails, self.kernel, self.head
-        if not tails:
-            return lambda *numbers: None
-        if isinstance(kernel, Kernel):
+        if tails and isinstance(kernel, Kernel):
             key: list[Any] = []
             given: list[Any] = []
             for argument in head:
@@ -54,10 +74,62 @@ class Repeat:
                 spread(number, key, [])
             last, lasts = calls.spread()
             door = kernel.door((*key, *last), (*head, *numbers, *tails[0]))
-            run = None if door is kernel else door.again(given, len(numbers), lasts)
-            if run is not None:
-                return run  # type: ignore[no-any-return]
-        return lambda *numbers: share(lambda k: kernel(*head, *numbers, *tails[k]), len(tails))
+            packs = None if door is kernel else door.packs(given, len(numbers), lasts)
+            if packs is not None:
+                self._door, self._packs = door, packs
+                self._run = door.calls(packs, len(tails), self.brief)
+                return
+        self._run = lambda *numbers: share(lambda k: kernel(*head, *numbers, *tails[k]), len(tails))
+
+
+class Relay:
+    """Calls of several kernels, one kernel after another, in some rounds, in one go on the threads.
+
+    `stopped` is an array of one number that kernels may set: where it is not 0, nothing further is
+    called. `possible` tells whether all kernels can be called so.
+    """
+
+    def __init__(self, rounds: int, stopped: Any) -> None:
+        self.rounds, self.stopped, self.possible = rounds, stopped, True
+        self._phases: list[tuple[Door, int, int, int]] = []
+        self._packs: list[bytes] = []
+        self._size = self._most = 0
+
+    def add(self, calls: Repeat, numbers: Sequence[Sequence[float]] = ()) -> None:
+        """Append calls; with those numbers in the middle in every round, if there are any."""
+        if not calls.count:
+            return
+        packed = [calls.packed(*given) for given in numbers or ((),)]
+        size = 0
+        for one in packed:
+            if one is None:
+                self.possible = False
+                return
+            door, packs = one
+            size = len(packs)
+            self._packs.append(packs)
+        self._phases.append((door, self._size, calls.count, size if numbers else 0))
+        self._size += size * len(packed)
+        self._most = max(self._most, calls.count)
+
+    def run(self) -> None:
+        """Call."""
+        packs, phases = b"".join(self._packs), len(self._phases)
+        begin = ctypes.cast(ctypes.c_char_p(packs), ctypes.c_void_p).value or 0
+        table = array("q")
+        for door, at, count, further in self._phases:
+            table.extend((door.address, begin + at, door.stride, count, further))
+        total = phases * self.rounds
+        counters = array("q", bytes(8 * COUNTERS * total))
+        where, counted, stopped = (
+            table.buffer_info()[0], counters.buffer_info()[0], self.stopped.ctypes.data,
+        )  # fmt: skip
+        run = runner()
+        share_phases(
+            lambda most: run(where, phases, counted, total, most, stopped),  # type: ignore[no-any-return]
+            self._most,
+            lambda: self.stopped.fill(-1),
+        )
 
 
 def _alike(known: Any, given: Any) -> bool:
@@ -76,10 +148,11 @@ class Repeats:
         self._known: dict[Any, Repeat] = {}
 
     def __call__(
-        self, name: Any, kernel: Any, head: Sequence[Any], tails: Calls | Sequence[Any]
-    ) -> Repeat:
+        self, name: Any, kernel: Any, head: Sequence[Any], tails: Calls | Sequence[Any],
+        brief: bool = False,
+    ) -> Repeat:  # fmt: skip
         """What calls a kernel with such arrays: that of before if they are the same."""
         known = self._known.get(name)
         if known is None or not known.fits(kernel, head, tails):
-            known = self._known[name] = Repeat(kernel, head, tails)
+            known = self._known[name] = Repeat(kernel, head, tails, brief)
         return known

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from motes.compile.pairs import FORCE, POTENTIAL, VIRIAL, Law
 from motes.errors import SceneError, SimulationError
 from motes.group.lasting import Body, Class, Kept, Lasting, Lists
-from motes.group.sums import RECORDS, Call, Packed, Places, Plan, Sums
+from motes.group.sums import RECORDS, Packed, Places, Plan, Sums
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, arrange, common_grid, wrapped
 from motes.interact.clusters import Room, cluster_lists, particle_lists
+from motes.repeat import Relay, Repeat
 
 ALIKE = 1.5
 """Ratio of reaches up to which laws share lists."""
@@ -192,6 +193,24 @@ class Nearby:
                     continue
             self._push(k, bodies, pushes, memory)
 
+    def plans(
+        self, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting
+    ) -> list[Callable[[Relay, Sequence[int]], None]] | None:
+        """What `push` would do as long as lists hold, to be appended to a relay with the numbers, by
+        round, that stop it where they do not. None where that cannot be said beforehand."""
+        if self.swarm is not None or memory.untidy or len(memory.lists) != len(self.classes):
+            return None
+        found: list[Callable[[Relay, Sequence[int]], None]] = []
+        for k, (shared, lists) in enumerate(zip(self.classes, memory.lists, strict=True)):
+            plan = self._plans.get(k)
+            if plan is None or lists is None or not lists.settled or shared.every:
+                return None
+            if not plan.fits(lists, bodies, pushes):
+                return None
+            margin = shared.margin(lists, plan.time)
+            found.append(partial(plan.relay, margin))
+        return found
+
     def _push(
         self, k: int, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting
     ) -> None:
@@ -201,7 +220,7 @@ class Nearby:
             if message := self._too_long(law, time):
                 raise SimulationError(message)
         found, places = self._current(k, bodies, memory, time)
-        sums: list[Call] = []
+        sums: list[Repeat] = []
         for law, targets, sources in shared.laws:
             sums += self._sums.pushing(law, targets, sources, time, found, places.packed, pushes)
         plan = Plan(found, places, sums, time, bodies, pushes)

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from motes.compile.pairs import Law
 from motes.compile.text import AXES
 from motes.group.lasting import Body, Class, Lists
-from motes.interact.arrange import FAR, Arranged, Box, pack, pack_images, packed_values
-from motes.jit import even_blocks
+from motes.interact.arrange import Arranged, Box, pack, pack_images, packed_values
+from motes.jit import BRIEF, even_blocks, jit
 from motes.memory import allocate
-from motes.repeat import Repeats
+from motes.repeat import Relay, Repeat, Repeats
 
 RECORDS = "records"
 """Name of the places of all slots, x, y, z and a fourth number that nobody reads."""
@@ -66,14 +66,23 @@ def _most(ways: Sequence[Array]) -> list[float]:
     return [max(column) if sum(column) >= 0 else math.nan for column in columns]
 
 
+@jit
+def judge(stop: Any, limit: Any, number: Any, moved: Any) -> None:
+    """Stop, with a number, where one has gone further than half a limit, or nobody knows where."""
+    for k in range(moved.shape[0]):
+        if not 2 * np.sqrt(moved[k, 1]) <= limit:
+            stop[0] = number
+
+
 class Plan:
     """An evaluation that can be carried out again while lists and arrays are the same."""
 
     def __init__(
-        self, lists: Lists, places: Places, sums: Sequence[Call], time: float,
+        self, lists: Lists, places: Places, sums: Sequence[Repeat], time: float,
         bodies: dict[str, Body], pushes: dict[str, Array],
     ) -> None:  # fmt: skip
         self.lists, self.places, self._sums, self.time = lists, places, sums, time
+        self._judge: Repeat | None = None
         self._arrays = [
             (name, bodies[name].motion, pushes[name], kept) for name, kept in lists.kept.items()
         ]
@@ -93,6 +102,18 @@ class Plan:
         """Add the accelerations."""
         for call in self._sums:
             call()
+
+    def relay(self, margin: float, relay: Relay, numbers: Sequence[int]) -> None:
+        """Append the evaluation to a relay, which it stops with the round's number, before the sums,
+        where lists do not hold: two ways since they were shortened must be within a margin."""
+        if self._judge is None or self._judge.head[0] is not relay.stopped:
+            self._judge = Repeat(judge, (relay.stopped,), [(way,) for way in self.places.ways])
+        for call in self.places.calls:
+            assert isinstance(call, Repeat)  # Else the plan would not be kept.
+            relay.add(call)
+        relay.add(self._judge, [(margin, number) for number in numbers])
+        for call in self._sums:
+            relay.add(call)
 
 
 class Sums:
@@ -132,11 +153,11 @@ class Sums:
 
     def _packing(
         self, body: Body, arranged: Arranged, records: Array, mark: Array | None, ways: list[Array]
-    ) -> list[Call]:
+    ) -> list[Repeat]:
         """Calls that write a system's places into records, and the longest ways."""
         n, images = arranged.order.size, arranged.ghost_of.size
-        parts = [(k, *part) for k, part in enumerate(even_blocks(n))]
-        moved = self._space((body.name, "moved"), (max(len(parts), 1), 2), np.float64)
+        parts = [(k, *part) for k, part in enumerate(even_blocks(n) or [(0, 0)])]
+        moved = self._space((body.name, "moved"), (len(parts), 2), np.float64)
         moved.fill(0)
         ways.append(moved)
         if mark is None:
@@ -144,9 +165,10 @@ class Sums:
         place = arranged.order, arranged.real.position, self._period, mark, records, moved
         image = records, arranged.ghost_of, arranged.image, arranged.shift, n
         return [
-            self._calls((body.name, "x"), pack, (body.motion, *place), parts),
-            self._calls((body.name, "images"), pack_images, image, even_blocks(images)),
-            partial(records[-1].fill, FAR),
+            self._calls((body.name, "x"), pack, (body.motion, *place), parts, n <= BRIEF),
+            self._calls(
+                (body.name, "images"), pack_images, image, even_blocks(images), images <= BRIEF
+            ),
         ]
 
     def _views(self, name: str, records: Array) -> dict[str, Array]:
@@ -184,9 +206,9 @@ class Sums:
     def pushing(
         self, law: Law, targets: Iterable[str], sources: Sequence[str], time: float, found: Lists,
         packed: Packed, pushes: dict[str, Array],
-    ) -> list[Call]:  # fmt: skip
+    ) -> list[Repeat]:  # fmt: skip
         """Calls that add a law's accelerations (3, n) to pushes, with the last source's sums."""
-        calls: list[Call] = []
+        calls: list[Repeat] = []
         for target in targets:
             out = self._room_of_sums(law, law.summed, target, found)
             for k, source in enumerate(sources):

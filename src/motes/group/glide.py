@@ -1,0 +1,130 @@
+"""Several steps of a group in one pass, while lists hold and particles do nothing but move.
+
+A step of ten thousand particles lasts a millisecond, and has some ten kernels; here those of a few
+steps are a relay, with nothing between them. Where lists do not hold any more it stops, and the step
+is finished kernel by kernel: results are those of single steps, to the last bit.
+"""
+
+# mypy: disallow-untyped-decorators=False
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from motes.group.lasting import Lasting
+from motes.group.members import Member
+from motes.group.methods import at, split, turns
+from motes.jit import BRIEF, even_blocks, jit
+from motes.repeat import Relay, Repeat, Repeats
+from motes.state import Particles
+from motes.step import Interval
+from motes.tableau import Splitting
+
+if TYPE_CHECKING:
+    from motes.group.group import Group
+
+TOGETHER = 8
+"""Most steps of a relay: lists of particles last about as long."""
+
+
+@jit
+def clear(push: Any, begin: Any, end: Any) -> None:
+    """Take accelerations (3, n) to 0."""
+    for axis in range(3):
+        push[axis][begin:end] = 0
+
+
+class Glide:
+    """Takes one group through steps."""
+
+    def __init__(self, group: Group) -> None:
+        self.group, self._calls = group, Repeats()
+        self._stopped = np.zeros(1, np.int64)
+        nearby = group.nearby
+        more = (group.interactions, group.exchanges, group.constraints.laws, group.captures.laws)
+        self.possible = (
+            isinstance(group.method, Splitting)
+            and bool(nearby.classes)
+            and not (any(more) or nearby.depends_on_velocity)
+        )
+        """Whether forces within reach are all that happens between particles."""
+
+    def __call__(
+        self, systems: dict[str, Particles], intervals: Sequence[Interval], memory: Lasting,
+        closing: Sequence[Repeat],
+    ) -> int:  # fmt: skip
+        """Take undisturbed systems through some of these steps, with calls that close each.
+
+        Returns through how many, 0 where a step has to be taken by itself, as after births.
+        """
+        intervals = intervals[:TOGETHER]
+        method, kept = self.group.method, {}
+        assert isinstance(method, Splitting)
+        for name in self.group.steppers:
+            kept[name] = systems[name].count, systems[name].deaths
+        known = memory.push is not None and memory.time == intervals[0].begin
+        sums, lasts = _sums(method, known)
+        if memory.kept != kept or known != lasts or not memory.pushes.keys() >= kept.keys():
+            return 0
+        members = {n: self.group.member(n, systems[n], systems[n].count, memory) for n in kept}
+        relay = self._relay(members, method, sums, intervals, memory, closing)
+        if relay is None:
+            return 0
+        self._stopped.fill(0)
+        relay.run()
+        memory.push = None
+        if not self._stopped[0]:
+            memory.steps += len(intervals)
+            if lasts:
+                memory.push = {name: memory.pushes[name] for name in kept}
+                memory.time = intervals[-1].end
+            return len(intervals)
+        step, turn = divmod(int(self._stopped[0]) - 1, len(turns(method)))
+        memory.steps += step + 1
+        split(self.group, members, intervals[step], method, memory, turn)
+        for calls in closing:
+            calls()
+        return step + 1
+
+    def _relay(
+        self, members: dict[str, Member], method: Splitting, sums: Sequence[bool],
+        intervals: Sequence[Interval], memory: Lasting, closing: Sequence[Repeat],
+    ) -> Relay | None:  # fmt: skip
+        """All calls of a step, with the numbers of several, or None where lists must be built."""
+        pushes = {name: memory.pushes[name] for name in members}
+        bodies = {name: member.body(intervals[0].begin) for name, member in members.items()}
+        plans = self.group.nearby.plans(bodies, pushes, memory)
+        if plans is None:
+            return None
+        relay, each = Relay(len(intervals), self._stopped), len(turns(method))
+        for name, member in members.items():
+            member.push = pushes[name]
+        for turn, (kick, drift, place) in enumerate(turns(method)):
+            if sums[turn]:
+                for name, member in members.items():
+                    parts, brief = even_blocks(member.alive), member.alive <= BRIEF
+                    relay.add(self._calls(("clear", name), clear, (member.push,), parts, brief))
+                for plan in plans:
+                    plan(relay, [1 + turn + each * k for k in range(len(intervals))])
+            for name, share in (("kick", kick), ("drift", drift)):
+                numbers = [(at(one, place), share * one.length) for one in intervals]
+                for member in members.values() if share else ():
+                    relay.add(member.calls(name, member.K), numbers)
+        for calls in closing:
+            relay.add(calls)
+        self.possible = relay.possible
+        return relay if relay.possible else None
+
+
+def _sums(method: Splitting, known: bool) -> tuple[list[bool], bool]:
+    """In which turns of a step forces are summed up, and whether the next step can use the last.
+
+    `known` says whether those at the begin are known from the step before.
+    """
+    last, found = 0.0 if known else None, []
+    for kick, drift, place in turns(method):
+        found.append(bool(kick) and last != place)
+        last = None if drift else place if kick else last
+    return found, last == 1.0
