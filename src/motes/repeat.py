@@ -55,11 +55,15 @@ class Repeat:
             self._prepare(numbers)
         self._run(*numbers)
 
-    def packed(self, *numbers: float) -> tuple[Door, bytes] | None:
-        """The kernel's door and the arguments of all calls; None where Numba compiled it."""
-        if self._known != tuple(map(type, numbers)):
-            self._prepare(numbers)
-        return None if self._door is None else (self._door, self._packs(*numbers))
+    def packed(self, numbers: Sequence[Sequence[float]]) -> tuple[Door, list[bytes]] | None:
+        """The kernel's door, and the arguments of all calls with each of these numbers in the
+        middle; None where Numba compiled it."""
+        if self._known != tuple(map(type, numbers[0])):
+            self._prepare(numbers[0])
+        if self._door is None:
+            return None
+        packs = self._packs
+        return self._door, [packs(*given) for given in numbers]
 
     def _prepare(self, numbers: Sequence[float]) -> None:
         self._known, self._door = tuple(map(type, numbers)), None
@@ -97,20 +101,19 @@ class Relay:
 
     def add(self, calls: Repeat, numbers: Sequence[Sequence[float]] = ()) -> None:
         """Append calls; with those numbers in the middle in every round, if there are any."""
-        if not calls.count:
+        count = calls.count
+        if not count:
             return
-        packed = [calls.packed(*given) for given in numbers or ((),)]
-        size = 0
-        for one in packed:
-            if one is None:
-                self.possible = False
-                return
-            door, packs = one
-            size = len(packs)
-            self._packs.append(packs)
-        self._phases.append((door, self._size, calls.count, size if numbers else 0))
-        self._size += size * len(packed)
-        self._most = max(self._most, calls.count)
+        packed = calls.packed(numbers or ((),))
+        if packed is None:
+            self.possible = False
+            return
+        door, packs = packed
+        size = len(packs[0])
+        self._phases.append((door, self._size, count, size if numbers else 0))
+        self._packs += packs
+        self._size += size * len(packs)
+        self._most = max(self._most, count)
 
     def run(self) -> None:
         """Call."""

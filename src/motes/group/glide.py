@@ -25,7 +25,7 @@ from motes.tableau import Splitting
 if TYPE_CHECKING:
     from motes.group.group import Group
 
-TOGETHER = 8
+TOGETHER = 12
 """Most steps of a relay: lists of particles last about as long."""
 
 
@@ -109,9 +109,10 @@ class Glide:
                 for plan in plans:
                     plan(relay, [1 + turn + each * k for k in range(len(intervals))])
             for name, share in (("kick", kick), ("drift", drift)):
-                numbers = [(at(one, place), share * one.length) for one in intervals]
-                for member in members.values() if share else ():
-                    relay.add(member.calls(name, member.K), numbers)
+                if share:
+                    numbers = [(at(one, place), share * one.length) for one in intervals]
+                    for member in members.values():
+                        relay.add(member.calls(name, member.K), numbers)
         for calls in closing:
             relay.add(calls)
         self.possible = relay.possible
