@@ -200,20 +200,28 @@ def bound(kernel: Callable[..., Any], *arguments: Any) -> Callable[..., Any]:
 
 
 class Calls:
-    """The last arguments of many calls of a kernel, of the same types in all of them."""
+    """The last arguments of many calls of a kernel, of the same types in all of them.
 
-    def __init__(self, tails: Sequence[Sequence[Any]]) -> None:
-        self.tails = tails
+    Where they are arrays and plain numbers, and whoever makes them knows that their types are
+    `alike`, only the first are looked at.
+    """
+
+    def __init__(self, tails: Sequence[Sequence[Any]], alike: bool = False) -> None:
+        self.tails, self._alike = tails, alike
         self._spread: tuple[list[Any], list[list[Any]]] | None = None
 
     def spread(self) -> tuple[list[Any], list[list[Any]]]:
         """What the arguments' types follow from, and their numbers for every call."""
-        from motes.machine.door import spread
+        from motes.machine.door import numbers_of, spread
 
         if self._spread is None:
             first: list[Any] = []
             lasts: list[list[Any]] = []
-            for tail in self.tails:
+            if self._alike and self.tails:
+                for argument in self.tails[0]:
+                    spread(argument, first, [])
+                lasts = list(map(numbers_of, self.tails))
+            for tail in self.tails[len(lasts) :]:
                 key: list[Any] = []
                 lasts.append([])
                 for argument in tail:

@@ -163,12 +163,12 @@ WAITING = 2
 """What a function for `share_phases` returns when it has waited long for other threads."""
 
 
-def share_phases(run: Callable[[int], int], count: int, stop: Callable[[], Any]) -> None:
+def share_phases(run: Callable[[], int], count: int, stop: Callable[[], Any]) -> None:
     """Run what does some calls, as long as it returns anything but 0, on as many threads as there
     are calls at once; `stop` lets no more begin."""
 
     def work() -> None:
-        while left := run(AT_ONCE):
+        while left := run():
             if left == WAITING:
                 _give_way()
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from array import array
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from motes.jit import Calls, Kernel, share
@@ -90,11 +91,12 @@ class Relay:
     """Calls of several kernels, one kernel after another, in some rounds, in one go on the threads.
 
     `stopped` is an array of one number that kernels may set: where it is not 0, nothing further is
-    called. `possible` tells whether all kernels can be called so.
+    called. A thread does so many calls `at_once`, before it looks whether it was interrupted.
+    `possible` tells whether all kernels can be called so.
     """
 
-    def __init__(self, rounds: int, stopped: Any) -> None:
-        self.rounds, self.stopped, self.possible = rounds, stopped, True
+    def __init__(self, rounds: int, stopped: Any, at_once: int) -> None:
+        self.rounds, self.stopped, self.at_once, self.possible = rounds, stopped, at_once, True
         self._phases: list[tuple[Door, int, int, int]] = []
         self._packs: list[bytes] = []
         self._size = self._most = 0
@@ -127,12 +129,8 @@ class Relay:
         where, counted, stopped = (
             table.buffer_info()[0], counters.buffer_info()[0], self.stopped.ctypes.data,
         )  # fmt: skip
-        run = runner()
-        share_phases(
-            lambda most: run(where, phases, counted, total, most, stopped),  # type: ignore[no-any-return]
-            self._most,
-            lambda: self.stopped.fill(-1),
-        )
+        given = where, phases, counted, total, self.at_once, stopped
+        share_phases(partial(runner(), *given), self._most, lambda: self.stopped.fill(-1))
 
 
 def _alike(known: Any, given: Any) -> bool:

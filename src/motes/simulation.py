@@ -273,7 +273,8 @@ class Simulation:
         state = self._state
         if steps < 2 or not self._may_glide:
             return False
-        times = [self._step_begin(state, k) for k in range(steps + 1)]
+        begin, length = state.number - self._lead_in, self.scene.step
+        times = [(begin + k) * length for k in range(steps + 1)]
         span = times[0], times[-1], self.scene.step
         if not all(s.undisturbed(state.systems[n], *span) for n, s in self._steppers.items()):
             return False

@@ -8,7 +8,7 @@ k-th birth of an emitter is a function of time.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -122,9 +122,10 @@ class Particles:
         self.deaths += gone
         return gone
 
-    def reorder(self, order: NDArray[np.int32]) -> None:
-        """Move rows: row k becomes what row `order[k]` was, for the first of the rows."""
-        arrays = self.arrays()
+    def reorder(self, order: NDArray[np.int32], also: Iterable[NDArray[Any]] = ()) -> None:
+        """Move rows: row k becomes what row `order[k]` was, for the first of the rows, and in other
+        arrays that go with them."""
+        arrays = [*self.arrays(), *also]
         share(lambda k: _move(arrays[k], order, np.empty(order.size, arrays[k].dtype)), len(arrays))
 
     def first_not_finite(self) -> int | None:

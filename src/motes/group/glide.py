@@ -17,6 +17,7 @@ from motes.group.lasting import Lasting
 from motes.group.members import Member
 from motes.group.methods import at, split, turns
 from motes.jit import BRIEF, even_blocks, jit
+from motes.pool import AT_ONCE
 from motes.repeat import Relay, Repeat, Repeats
 from motes.state import Particles
 from motes.step import Interval
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 
 TOGETHER = 12
 """Most steps of a relay: lists of particles last about as long."""
+
+LOOK = 1 << 22
+"""Particles divided by calls of a relay after which a thread looks whether it was interrupted."""
 
 
 @jit
@@ -81,6 +85,7 @@ class Glide:
                 memory.push = {name: memory.pushes[name] for name in kept}
                 memory.time = intervals[-1].end
             return len(intervals)
+        self.group.nearby.forget()
         step, turn = divmod(int(self._stopped[0]) - 1, len(turns(method)))
         memory.steps += step + 1
         split(self.group, members, intervals[step], method, memory, turn)
@@ -98,7 +103,8 @@ class Glide:
         plans = self.group.nearby.plans(bodies, pushes, memory)
         if plans is None:
             return None
-        relay, each = Relay(len(intervals), self._stopped), len(turns(method))
+        at_once = max(AT_ONCE, LOOK // max(m.alive for m in members.values()))
+        relay, each = Relay(len(intervals), self._stopped, at_once), len(turns(method))
         for name, member in members.items():
             member.push = pushes[name]
         for turn, (kick, drift, place) in enumerate(turns(method)):

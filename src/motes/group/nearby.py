@@ -104,9 +104,7 @@ class Nearby:
         if self.swarm is None or any(name in shared.systems for shared in self.classes):
             return
         order = self.swarm.order(body)
-        body.rows.reorder(order)
-        if memory.push is not None:
-            memory.push[name][:] = memory.push[name][:, order]
+        body.rows.reorder(order, () if memory.push is None else memory.push[name])
 
     def _reorder(self, k: int, names: set[str], bodies: dict[str, Body], memory: Lasting) -> None:
         """Move rows into the order of one class's cells; all lists keep telling where they are."""
@@ -114,16 +112,17 @@ class Nearby:
         assert mine is not None
         for name in sorted(names):
             order = mine.arranged[name].order
-            bodies[name].rows.reorder(order)
-            place = np.empty_like(order)
-            place[order] = np.arange(place.size, dtype=np.int32)
+            bodies[name].rows.reorder(order, () if memory.push is None else memory.push[name])
+            itself = np.arange(order.size, dtype=np.int32)
             for i, other in enumerate(memory.lists):
                 if other is not None and name in other.arranged:
-                    there = other.arranged[name]
-                    there = there._replace(order=place[there.order])
+                    there, moved_there = other.arranged[name], itself
+                    if i != k:
+                        place = np.empty_like(order)
+                        place[order] = itself
+                        moved_there = place[there.order]
+                    there = there._replace(order=moved_there)
                     memory.lists[i] = replace(other, arranged={**other.arranged, name: there})
-            if memory.push is not None:
-                memory.push[name][:] = memory.push[name][:, order]
         settled = memory.lists[k]
         assert settled is not None
         memory.lists[k] = replace(settled, settled=True)
@@ -210,6 +209,10 @@ class Nearby:
             margin = shared.margin(lists, plan.time)
             found.append(partial(plan.relay, margin))
         return found
+
+    def forget(self) -> None:
+        """Plan anew: lists are known not to hold any more."""
+        self._plans.clear()
 
     def _push(
         self, k: int, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting

@@ -7,8 +7,9 @@ can be carried out again.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -45,6 +46,10 @@ class Places:
     """For every system, squares of the longest ways (k, 2) since lists were built and shortened."""
     lasting: bool
     """Whether all that is read, besides where they are, is the same as long as the lists hold."""
+    read: Sequence[Any]
+    """The arrays that it is about."""
+    judges: dict[int, Repeat] = field(default_factory=dict)
+    """Calls of `judge` for an array, by its identity."""
 
     def __call__(self) -> tuple[float, float]:
         """Write; returns how far one has moved since the lists were built, and shortened [m]."""
@@ -82,7 +87,6 @@ class Plan:
         bodies: dict[str, Body], pushes: dict[str, Array],
     ) -> None:  # fmt: skip
         self.lists, self.places, self._sums, self.time = lists, places, sums, time
-        self._judge: Repeat | None = None
         self._arrays = [
             (name, bodies[name].motion, pushes[name], kept) for name, kept in lists.kept.items()
         ]
@@ -106,12 +110,13 @@ class Plan:
     def relay(self, margin: float, relay: Relay, numbers: Sequence[int]) -> None:
         """Append the evaluation to a relay, which it stops with the round's number, before the sums,
         where lists do not hold: two ways since they were shortened must be within a margin."""
-        if self._judge is None or self._judge.head[0] is not relay.stopped:
-            self._judge = Repeat(judge, (relay.stopped,), [(way,) for way in self.places.ways])
         for call in self.places.calls:
             assert isinstance(call, Repeat)  # Else the plan would not be kept.
             relay.add(call)
-        relay.add(self._judge, [(margin, number) for number in numbers])
+        judges, stopped = self.places.judges, relay.stopped
+        if id(stopped) not in judges:
+            judges[id(stopped)] = Repeat(judge, (stopped,), [(way,) for way in self.places.ways])
+        relay.add(judges[id(stopped)], [(margin, number) for number in numbers])
         for call in self._sums:
             relay.add(call)
 
@@ -125,12 +130,29 @@ class Sums:
         self._rooms: dict[Any, tuple[Array, Array]] = {}
         self._columns: dict[str, tuple[Array, dict[str, Array]]] = {}
         self._calls = Repeats()
+        self._places: Places | None = None
 
     def places(self, shared: Class, found: Lists, bodies: dict[str, Body]) -> Places:
         """What writes what the laws of a class read of every system in the order of slots.
 
-        Places come as records (slots + 1, 4), and, as the columns of these, one by one.
+        Places come as records (slots + 1, 4), and, as the columns of these, one by one. What was
+        made last serves again while it is about the same arrays.
         """
+        names = list(shared.fields)
+        read: list[Any] = [shared, found.columns]
+        for name in names:
+            arranged = found.arranged[name]
+            records = self._space((name, "x"), (arranged.slots + 1, 4))
+            read += [arranged, records, found.marks.get(name), bodies[name].motion]
+        known = self._places
+        if known is None or not known.lasting or not all(map(operator.is_, known.read, read)):
+            known = self._places = self._new_places(shared, found, bodies, read)
+        return known
+
+    def _new_places(
+        self, shared: Class, found: Lists, bodies: dict[str, Body], read: Sequence[Any]
+    ) -> Places:
+        """The same, made anew."""
         packed: Packed = {}
         calls: list[Call] = []
         ways: list[Array] = []
@@ -149,7 +171,7 @@ class Sums:
                     kept, lasting = self._space((name, field), (size,)), False
                     calls.append(partial(packed_values, arranged, body.column(field), kept))
                 columns[field] = kept
-        return Places(packed, calls, ways, lasting)
+        return Places(packed, calls, ways, lasting, read)
 
     def _packing(
         self, body: Body, arranged: Arranged, records: Array, mark: Array | None, ways: list[Array]
@@ -158,7 +180,6 @@ class Sums:
         n, images = arranged.order.size, arranged.ghost_of.size
         parts = [(k, *part) for k, part in enumerate(even_blocks(n) or [(0, 0)])]
         moved = self._space((body.name, "moved"), (len(parts), 2), np.float64)
-        moved.fill(0)
         ways.append(moved)
         if mark is None:
             mark = NO_MARKS[self.real]
