@@ -26,8 +26,8 @@ from motes.tableau import Splitting
 if TYPE_CHECKING:
     from motes.group.group import Group
 
-TOGETHER = 12
-"""Most steps of a relay: lists of particles last about as long."""
+TOGETHER = 16
+"""Most steps of a relay: lists of clusters last somewhat longer."""
 
 LOOK = 1 << 22
 """Particles divided by calls of a relay after which a thread looks whether it was interrupted."""
@@ -79,13 +79,13 @@ class Glide:
         self._stopped.fill(0)
         relay.run()
         memory.push = None
+        self.group.nearby.relayed(memory, bool(self._stopped[0]))
         if not self._stopped[0]:
             memory.steps += len(intervals)
             if lasts:
                 memory.push = {name: memory.pushes[name] for name in kept}
                 memory.time = intervals[-1].end
             return len(intervals)
-        self.group.nearby.forget()
         step, turn = divmod(int(self._stopped[0]) - 1, len(turns(method)))
         memory.steps += step + 1
         split(self.group, members, intervals[step], method, memory, turn)

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from motes.compile.pairs import FORCE, POTENTIAL, VIRIAL, Law
 from motes.errors import SceneError, SimulationError
 from motes.group.lasting import Body, Class, Kept, Lasting, Lists
+from motes.group.renewal import bounds_in
 from motes.group.sums import RECORDS, Packed, Places, Plan, Sums
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, arrange, common_grid, wrapped
-from motes.interact.clusters import Room, cluster_lists, particle_lists
+from motes.interact.clusters import RADIUS, WANTED, Room, cluster_lists, particle_lists
 from motes.repeat import Relay, Repeat
 
 ALIKE = 1.5
@@ -160,10 +161,11 @@ class Nearby:
     ) -> Lists:
         """Lists with those of particles, within a radius [m] of where they are now."""
         places = {name: packed[name][RECORDS] for name in shared.systems}
-        short = {}
+        bounds, short = bounds_in(rooms), {}
+        bounds[[RADIUS, WANTED]] = radius, 1
         for (a, b), lists in found.near.items():
             room = rooms.setdefault((a, b), Room())
-            short[a, b] = particle_lists(lists, places[a], places[b], radius, a == b, room)
+            short[a, b] = particle_lists(lists, places[a], places[b], bounds, a == b, room)
         marks = {}
         for name, place in places.items():
             here = place[: found.arranged[name].order.size]
@@ -195,8 +197,9 @@ class Nearby:
     def plans(
         self, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting
     ) -> list[Callable[[Relay, Sequence[int]], None]] | None:
-        """What `push` would do as long as lists hold, to be appended to a relay with the numbers, by
-        round, that stop it where they do not. None where that cannot be said beforehand."""
+        """What `push` would do until lists of clusters do not hold any more, to be appended to a
+        relay with the numbers, by round, that stop it then. None where that cannot be said
+        beforehand."""
         if self.swarm is not None or memory.untidy or len(memory.lists) != len(self.classes):
             return None
         found: list[Callable[[Relay, Sequence[int]], None]] = []
@@ -206,13 +209,18 @@ class Nearby:
                 return None
             if not plan.fits(lists, bodies, pushes):
                 return None
-            margin = shared.margin(lists, plan.time)
-            found.append(partial(plan.relay, margin))
+            rooms = memory.rooms.setdefault((k,), {})
+            found.append(partial(plan.relay, shared, rooms))
         return found
 
-    def forget(self) -> None:
-        """Plan anew: lists are known not to hold any more."""
-        self._plans.clear()
+    def relayed(self, memory: Lasting, stopped: bool) -> None:
+        """Take over what a relay has changed; if it has stopped, lists are known not to hold."""
+        for k, plan in self._plans.items():
+            lists = memory.lists[k]
+            if lists is plan.lists:
+                memory.lists[k] = plan.renewed()
+        if stopped:
+            self._plans.clear()
 
     def _push(
         self, k: int, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting

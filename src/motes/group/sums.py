@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -20,7 +20,8 @@ from motes.compile.pairs import Law
 from motes.compile.text import AXES
 from motes.group.lasting import Body, Class, Lists
 from motes.interact.arrange import Arranged, Box, pack, pack_images, packed_values
-from motes.jit import BRIEF, even_blocks, jit
+from motes.group.renewal import Renewal
+from motes.jit import BRIEF, even_blocks
 from motes.memory import allocate
 from motes.repeat import Relay, Repeat, Repeats
 
@@ -36,20 +37,20 @@ Packed = dict[str, dict[str, Array]]
 """Columns by system and name, in the order of slots."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Places:
     """Calls that write where everybody is."""
 
     packed: Packed
     calls: Sequence[Call]
-    ways: Sequence[Array]
-    """For every system, squares of the longest ways (k, 2) since lists were built and shortened."""
+    ways: Array
+    """Squares of the longest ways (k, 2) since lists were built and shortened."""
     lasting: bool
     """Whether all that is read, besides where they are, is the same as long as the lists hold."""
     read: Sequence[Any]
     """The arrays that it is about."""
-    judges: dict[int, Repeat] = field(default_factory=dict)
-    """Calls of `judge` for an array, by its identity."""
+    renewal: Renewal | None = None
+    """Calls that shorten lists anew."""
 
     def __call__(self) -> tuple[float, float]:
         """Write; returns how far one has moved since the lists were built, and shortened [m]."""
@@ -59,24 +60,16 @@ class Places:
         return math.sqrt(moved), math.sqrt(since)
 
 
-def _most(ways: Sequence[Array]) -> list[float]:
+def _most(ways: Array) -> list[float]:
     """The highest of each column, or not a number where there is one.
 
     Of a few rows in less time than NumPy takes to begin.
     """
-    if sum(map(len, ways)) > 64:
-        most: list[float] = np.concatenate(ways).max(axis=0).tolist()
+    if len(ways) > 64:
+        most: list[float] = ways.max(axis=0).tolist()
         return most
-    columns = zip(*(row for way in ways for row in way.tolist()), strict=True)
+    columns = zip(*ways.tolist(), strict=True)
     return [max(column) if sum(column) >= 0 else math.nan for column in columns]
-
-
-@jit
-def judge(stop: Any, limit: Any, number: Any, moved: Any) -> None:
-    """Stop, with a number, where one has gone further than half a limit, or nobody knows where."""
-    for k in range(moved.shape[0]):
-        if not 2 * np.sqrt(moved[k, 1]) <= limit:
-            stop[0] = number
 
 
 class Plan:
@@ -107,18 +100,29 @@ class Plan:
         for call in self._sums:
             call()
 
-    def relay(self, margin: float, relay: Relay, numbers: Sequence[int]) -> None:
-        """Append the evaluation to a relay, which it stops with the round's number, before the sums,
-        where lists do not hold: two ways since they were shortened must be within a margin."""
+    def relay(
+        self, shared: Class, rooms: dict[Any, Any], relay: Relay, numbers: Sequence[int]
+    ) -> None:
+        """Append the evaluation to a relay. Lists of particles are shortened anew where they must be;
+        where that cannot be, the relay stops with the round's number before the sums."""
         for call in self.places.calls:
             assert isinstance(call, Repeat)  # Else the plan would not be kept.
             relay.add(call)
-        judges, stopped = self.places.judges, relay.stopped
-        if id(stopped) not in judges:
-            judges[id(stopped)] = Repeat(judge, (stopped,), [(way,) for way in self.places.ways])
-        relay.add(judges[id(stopped)], [(margin, number) for number in numbers])
+        renewal = self.places.renewal
+        if renewal is None or renewal.short is not self.lists.short:
+            places = {name: columns[RECORDS] for name, columns in self.places.packed.items()}
+            renewal = Renewal(self.lists, places, self.places.ways, rooms, relay.stopped)
+            self.places.renewal = renewal
+        renewal.add(relay, shared, self.lists, self.time, numbers)
         for call in self._sums:
             relay.add(call)
+
+    def renewed(self) -> Lists:
+        """The lists as a relay has left them."""
+        renewal = self.places.renewal
+        if renewal is not None and renewal.held != self.lists.short_radius:
+            self.lists = replace(self.lists, short_radius=renewal.held)
+        return self.lists
 
 
 class Sums:
@@ -155,12 +159,16 @@ class Sums:
         """The same, made anew."""
         packed: Packed = {}
         calls: list[Call] = []
-        ways: list[Array] = []
-        lasting = True
+        parts = {name: even_blocks(bodies[name].alive) or [(0, 0)] for name in shared.fields}
+        ways = self._space(("ways",), (sum(map(len, parts.values())), 2), np.float64)
+        lasting, begin = True, 0
         for name, fields in shared.fields.items():
             body, arranged = bodies[name], found.arranged[name]
             records = self._space((name, "x"), (arranged.slots + 1, 4))
-            calls += self._packing(body, arranged, records, found.marks.get(name), ways)
+            end = begin + len(parts[name])
+            mark = found.marks.get(name)
+            calls += self._packing(body, arranged, records, mark, ways[begin:end], parts[name])
+            begin = end
             columns = packed[name] = self._views(name, records)
             for field in fields:
                 kept, size = found.columns.get((name, field)), arranged.slots + 1
@@ -174,19 +182,18 @@ class Sums:
         return Places(packed, calls, ways, lasting, read)
 
     def _packing(
-        self, body: Body, arranged: Arranged, records: Array, mark: Array | None, ways: list[Array]
-    ) -> list[Repeat]:
+        self, body: Body, arranged: Arranged, records: Array, mark: Array | None, ways: Array,
+        parts: Sequence[tuple[int, int]],
+    ) -> list[Repeat]:  # fmt: skip
         """Calls that write a system's places into records, and the longest ways."""
         n, images = arranged.order.size, arranged.ghost_of.size
-        parts = [(k, *part) for k, part in enumerate(even_blocks(n) or [(0, 0)])]
-        moved = self._space((body.name, "moved"), (len(parts), 2), np.float64)
-        ways.append(moved)
+        numbered = [(k, *part) for k, part in enumerate(parts)]
         if mark is None:
             mark = NO_MARKS[self.real]
-        place = arranged.order, arranged.real.position, self._period, mark, records, moved
+        place = arranged.order, arranged.real.position, self._period, mark, records, ways
         image = records, arranged.ghost_of, arranged.image, arranged.shift, n
         return [
-            self._calls((body.name, "x"), pack, (body.motion, *place), parts, n <= BRIEF),
+            self._calls((body.name, "x"), pack, (body.motion, *place), numbered, n <= BRIEF),
             self._calls(
                 (body.name, "images"), pack_images, image, even_blocks(images), images <= BRIEF
             ),

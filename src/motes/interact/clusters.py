@@ -25,6 +25,12 @@ from motes.machine.shuffles import LANES, near_slots, taken_apart
 from motes.memory import afford, allocate
 from motes.repeat import Repeat
 
+RADIUS, WANTED = range(2)
+"""Places in the bounds of lists of particles: their radius [m], and whether they are to be chosen."""
+
+LONGER = 2 * LANES
+"""Entries by which the longest list may grow, until who reads lists needs more room."""
+
 CANDIDATES = 1024
 """Candidates of a cluster that there is room for at first."""
 
@@ -43,7 +49,7 @@ class Part(NamedTuple):
     entry: NDArray[np.int32]
     """Slots of neighbours; the slot after the last stands for nobody."""
     longest: int
-    """Length of the longest list."""
+    """What the longest list is not longer than."""
 
 
 class Clusters(NamedTuple):
@@ -168,7 +174,7 @@ def _seek(
     """Append lists of a part's clusters; `state` holds the first without, what that needs, and the
     length of the longest list so far."""
     real = position.dtype.type
-    wide = radius * (1 + 2.0**-18)
+    wide = radius[0] * (1 + 2.0**-18)
     limit, nought = real(wide) * real(wide), real(0)
     n = cells.key.size
     nobody, no_one = np.int32(n + ghosts.key.size), np.int32(-1)
@@ -226,11 +232,15 @@ def _seek(
 
 @jit(flags=STRICT)
 def _choose(
-    own: Any, others: Any, itself: Any, state: Any, limit: Any, part: Any, cluster: Any,
+    own: Any, others: Any, itself: Any, state: Any, bounds: Any, part: Any, cluster: Any,
     near_first: Any, near: Any, place: Any, first: Any, entry: Any,
 ) -> None:  # fmt: skip
-    """Append lists of the particles of a part's clusters, of what is within a square of a distance;
+    """Append lists of the particles of a part's clusters, of what is within a radius, if wanted;
     `state` as for `_seek`."""
+    if not bounds[WANTED] > 0:
+        return
+    radius = own.dtype.type(bounds[RADIUS])
+    limit = radius * radius
     nobody, longest = np.int32(others.shape[0] - 1), state[part, 2]
     for c in range(state[part, 0], cluster.size - 1):
         a, b = cluster[c], cluster[c + 1]
@@ -270,19 +280,19 @@ def cluster_lists(
         first = np.zeros(cluster.size, np.int64)
         slots, place = np.empty(CANDIDATES, np.int32), np.empty((3, CANDIDATES), real)
         room.work.append((k, cluster, slots, place, first, entry))
-    longest, _ = _carried_out(_seek, head, float(radius), room)
+    longest, _ = _carried_out(_seek, head, np.array([float(radius)]), room)
     found = [Clusters(one[1], one[-2], one[-1], longest[one[0]]) for one in room.work]
     room.work, room.repeat = [], None
     return found
 
 
 def particle_lists(
-    lists: Sequence[Clusters], own: NDArray[Any], others: NDArray[Any], radius: float,
-    itself: bool, room: Room,
+    lists: Sequence[Clusters], own: NDArray[Any], others: NDArray[Any],
+    bounds: NDArray[np.float64], itself: bool, room: Room,
 ) -> Calls:  # fmt: skip
-    """Each particle's neighbours within `radius` [m] of places (slots + 1, 4), without itself.
+    """Each particle's neighbours within a radius [m] of places (slots + 1, 4), without itself.
 
-    `itself` says that particles are among the others; entries go into `room` as before. Returns
+    `bounds` holds the radius and that it is wanted, `itself` says that particles are among the others; entries go into `room` as before. Returns
     the lists, `Part`s, as last arguments of calls: those of before where they are in the same
     memory.
     """
@@ -295,12 +305,13 @@ def particle_lists(
             first, entry = np.zeros(counts[k] + 1, np.int64), entries[k]
             place = np.empty((3, longest), real)
             room.work.append((k, cluster, near_first, near, place, first, entry))
-    most, grown = _carried_out(_choose, (own, others, itself), real(radius) ** 2, room)
+    most, grown = _carried_out(_choose, (own, others, itself), bounds, room)
     if room.chosen is not None and not grown:
         known = [int(part[-1]) for part in room.chosen.tails]
         if all(map(le, most, known)):
             return room.chosen
         most = list(map(max, most, known))
+    most = [length + LONGER for length in most]
     parts = [Part(int(one[1][0]), one[5], one[6], most[one[0]]) for one in room.work]
     room.chosen = Calls(parts, alike=True)
     return room.chosen
@@ -318,7 +329,7 @@ def _entries(room: Room, likely: Sequence[int]) -> list[NDArray[np.int32]]:
     return room.entries
 
 
-def _carried_out(kernel: Any, head: Any, limit: Any, room: Room) -> tuple[list[int], bool]:
+def _carried_out(kernel: Any, head: Any, bounds: Any, room: Room) -> tuple[list[int], bool]:
     """Let a kernel fill the lists of all parts, with more room for those that need it.
 
     Returns the length of the longest list of every part, at least one vector, and whether any
@@ -329,17 +340,17 @@ def _carried_out(kernel: Any, head: Any, limit: Any, room: Room) -> tuple[list[i
         room.state = np.empty((len(work), 3), np.int64)
     state = room.state
     state.fill(0)
-    head = *head, state
+    head = *head, state, bounds
     if room.repeat is None or not room.repeat.fits(kernel, head, room.repeat.tails):
         room.repeat = Repeat(kernel, head, Calls(list(work), alike=True))
-    room.repeat(limit)
+    room.repeat()
     grown = False
     while waiting := [one for one in work if state[one[0], 0] < one[1].size - 1]:
         grown, room.repeat = True, None
         for one in waiting:
             work[one[0]] = _wider(one, *state[one[0], :2].tolist())
             afford(sum(part[-1].nbytes for part in work), "a list of neighbours")
-        each(kernel, (*head, limit), [work[one[0]] for one in waiting])
+        each(kernel, head, [work[one[0]] for one in waiting])
     room.entries = [one[-1] for one in work]
     return [max(LANES, longest) for longest in state[:, 2].tolist()], grown
 
