@@ -12,6 +12,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from motes.jit import Calls, Kernel, share
 from motes.machine.door import PLAIN, Door, spread
 from motes.machine.relay import COUNTERS, runner
@@ -37,6 +40,7 @@ class Repeat:
         self._ids = list(map(id, self.head))
         self._known: tuple[type, ...] | None = None
         self._door: Door | None = None
+        self._begin = 0
         self._packs: Packs = lambda *numbers: b""
         self._run: Callable[..., None] = lambda *numbers: None
 
@@ -56,15 +60,21 @@ class Repeat:
             self._prepare(numbers)
         self._run(*numbers)
 
-    def packed(self, numbers: Sequence[Sequence[float]]) -> tuple[Door, list[bytes]] | None:
-        """The kernel's door, and the arguments of all calls with each of these numbers in the
-        middle; None where Numba compiled it."""
-        if self._known != tuple(map(type, numbers[0])):
-            self._prepare(numbers[0])
+    def packed(self, numbers: NDArray[Any] | None) -> tuple[Door, bytes] | None:
+        """The kernel's door, and the arguments of all calls, with each row of these numbers in the
+        middle if there are any; None where Numba compiled it."""
+        first = () if numbers is None else numbers[0].tolist()
+        if self._known != tuple(map(type, first)):
+            self._prepare(first)
         if self._door is None:
             return None
-        packs = self._packs
-        return self._door, [packs(*given) for given in numbers]
+        packs = self._packs(*first)
+        if numbers is None:
+            return self._door, packs
+        words = np.frombuffer(packs * len(numbers), numbers.dtype).copy()
+        words = words.reshape(len(numbers), self.count, -1)
+        words[:, :, self._begin : self._begin + numbers.shape[1]] = numbers[:, None]
+        return self._door, words.tobytes()
 
     def _prepare(self, numbers: Sequence[float]) -> None:
         self._known, self._door = tuple(map(type, numbers)), None
@@ -81,7 +91,7 @@ class Repeat:
             door = kernel.door((*key, *last), (*head, *numbers, *tails[0]))
             packs = None if door is kernel else door.packs(given, len(numbers), lasts)
             if packs is not None:
-                self._door, self._packs = door, packs
+                self._door, self._packs, self._begin = door, packs, len(given)
                 self._run = door.calls(packs, len(tails), self.brief)
                 return
         self._run = lambda *numbers: share(lambda k: kernel(*head, *numbers, *tails[k]), len(tails))
@@ -101,20 +111,20 @@ class Relay:
         self._packs: list[bytes] = []
         self._size = self._most = 0
 
-    def add(self, calls: Repeat, numbers: Sequence[Sequence[float]] = ()) -> None:
-        """Append calls; with those numbers in the middle in every round, if there are any."""
+    def add(self, calls: Repeat, numbers: NDArray[Any] | None = None) -> None:
+        """Append calls; with a row of numbers (rounds, m) in the middle, if there are any."""
         count = calls.count
         if not count:
             return
-        packed = calls.packed(numbers or ((),))
+        packed = calls.packed(numbers)
         if packed is None:
             self.possible = False
             return
         door, packs = packed
-        size = len(packs[0])
-        self._phases.append((door, self._size, count, size if numbers else 0))
-        self._packs += packs
-        self._size += size * len(packs)
+        further = 0 if numbers is None else len(packs) // len(numbers)
+        self._phases.append((door, self._size, count, further))
+        self._packs.append(packs)
+        self._size += len(packs)
         self._most = max(self._most, count)
 
     def run(self) -> None:

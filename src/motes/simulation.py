@@ -20,6 +20,7 @@ from motes.errors import SceneError, SimulationError, likely
 from motes.frame import Frame
 from motes.group import Group, named_systems
 from motes.group.capture import CAPTURE
+from motes.group.glide import TOGETHER as GLIDE
 from motes.group.lasting import Lasting
 from motes.integrate import method
 from motes.interact.arrange import Box, wrap, wrapped
@@ -261,7 +262,7 @@ class Simulation:
     def _run(self, steps: int, progress: Callable[[Simulation], None] | None) -> None:
         last = self.steps + steps
         while self.steps < last:
-            if progress is None and self._glides(min(last - self.steps, TOGETHER)):
+            if progress is None and self._glides(last - self.steps):
                 continue
             begin, end = self._step_begin(self._state), self._step_begin(self._state, 1)
             self._advance(self._state, Interval(begin, end))
@@ -269,8 +270,8 @@ class Simulation:
                 progress(self)
 
     def _glides(self, steps: int) -> bool:
-        """Take several steps at once, if all particles only move in them."""
-        state = self._state
+        """Take several steps at once, at most so many, if all particles only move in them."""
+        state, steps = self._state, min(steps, GLIDE if self._groups else TOGETHER)
         if steps < 2 or not self._may_glide:
             return False
         begin, length = state.number - self._lead_in, self.scene.step
@@ -278,12 +279,12 @@ class Simulation:
         span = times[0], times[-1], self.scene.step
         if not all(s.undisturbed(state.systems[n], *span) for n, s in self._steppers.items()):
             return False
-        intervals = [Interval(*pair) for pair in pairwise(times)]
         if self._groups:
             memory, closing = state.memories[0], self._wraps(state) if self._closed else []
             assert isinstance(memory, Lasting)
-            steps = self._groups[0].glide(state.systems, intervals, memory, closing)
+            steps = self._groups[0].glide(state.systems, times, memory, closing)
         else:
+            intervals = [Interval(*pair) for pair in pairwise(times)]
             for name, stepper in self._steppers.items():
                 stepper.glide(state.systems[name], intervals)
         self.work += steps * self.count

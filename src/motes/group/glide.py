@@ -15,7 +15,7 @@ import numpy as np
 
 from motes.group.lasting import Lasting
 from motes.group.members import Member
-from motes.group.methods import at, split, turns
+from motes.group.methods import split, turns
 from motes.jit import BRIEF, even_blocks, jit
 from motes.pool import AT_ONCE
 from motes.repeat import Relay, Repeat, Repeats
@@ -26,8 +26,8 @@ from motes.tableau import Splitting
 if TYPE_CHECKING:
     from motes.group.group import Group
 
-TOGETHER = 16
-"""Most steps of a relay: lists of clusters last somewhat longer."""
+TOGETHER = 32
+"""Most steps of a relay: lists of clusters last about as long."""
 
 LOOK = 1 << 22
 """Particles divided by calls of a relay after which a thread looks whether it was interrupted."""
@@ -56,24 +56,27 @@ class Glide:
         """Whether forces within reach are all that happens between particles."""
 
     def __call__(
-        self, systems: dict[str, Particles], intervals: Sequence[Interval], memory: Lasting,
+        self, systems: dict[str, Particles], times: Sequence[float], memory: Lasting,
         closing: Sequence[Repeat],
     ) -> int:  # fmt: skip
-        """Take undisturbed systems through some of these steps, with calls that close each.
+        """Take undisturbed systems through some of the steps between these times, with calls that
+        close each.
 
         Returns through how many, 0 where a step has to be taken by itself, as after births.
         """
-        intervals = intervals[:TOGETHER]
+        if not all(lists is not None and lists.settled for lists in memory.lists):
+            return 0
+        steps = len(times) - 1
         method, kept = self.group.method, {}
         assert isinstance(method, Splitting)
         for name in self.group.steppers:
             kept[name] = systems[name].count, systems[name].deaths
-        known = memory.push is not None and memory.time == intervals[0].begin
+        known = memory.push is not None and memory.time == times[0]
         sums, lasts = _sums(method, known)
         if memory.kept != kept or known != lasts or not memory.pushes.keys() >= kept.keys():
             return 0
         members = {n: self.group.member(n, systems[n], systems[n].count, memory) for n in kept}
-        relay = self._relay(members, method, sums, intervals, memory, closing)
+        relay = self._relay(members, method, sums, times, memory, closing)
         if relay is None:
             return 0
         self._stopped.fill(0)
@@ -81,30 +84,33 @@ class Glide:
         memory.push = None
         self.group.nearby.relayed(memory, bool(self._stopped[0]))
         if not self._stopped[0]:
-            memory.steps += len(intervals)
+            memory.steps += steps
             if lasts:
                 memory.push = {name: memory.pushes[name] for name in kept}
-                memory.time = intervals[-1].end
-            return len(intervals)
+                memory.time = times[-1]
+            return steps
         step, turn = divmod(int(self._stopped[0]) - 1, len(turns(method)))
         memory.steps += step + 1
-        split(self.group, members, intervals[step], method, memory, turn)
+        interval = Interval(times[step], times[step + 1])
+        split(self.group, members, interval, method, memory, turn)
         for calls in closing:
             calls()
         return step + 1
 
     def _relay(
         self, members: dict[str, Member], method: Splitting, sums: Sequence[bool],
-        intervals: Sequence[Interval], memory: Lasting, closing: Sequence[Repeat],
+        times: Sequence[float], memory: Lasting, closing: Sequence[Repeat],
     ) -> Relay | None:  # fmt: skip
         """All calls of a step, with the numbers of several, or None where lists must be built."""
         pushes = {name: memory.pushes[name] for name in members}
-        bodies = {name: member.body(intervals[0].begin) for name, member in members.items()}
+        bodies = {name: member.body(times[0]) for name, member in members.items()}
         plans = self.group.nearby.plans(bodies, pushes, memory)
         if plans is None:
             return None
         at_once = max(AT_ONCE, LOOK // max(m.alive for m in members.values()))
-        relay, each = Relay(len(intervals), self._stopped, at_once), len(turns(method))
+        relay, each = Relay(len(times) - 1, self._stopped, at_once), len(turns(method))
+        begin, end = np.array(times[:-1]), np.array(times[1:])
+        length = end - begin
         for name, member in members.items():
             member.push = pushes[name]
         for turn, (kick, drift, place) in enumerate(turns(method)):
@@ -112,11 +118,13 @@ class Glide:
                 for name, member in members.items():
                     parts, brief = even_blocks(member.alive), member.alive <= BRIEF
                     relay.add(self._calls(("clear", name), clear, (member.push,), parts, brief))
+                numbers = 1 + turn + each * np.arange(length.size)
                 for plan in plans:
-                    plan(relay, [1 + turn + each * k for k in range(len(intervals))])
+                    plan(relay, numbers[:, None])
             for name, share in (("kick", kick), ("drift", drift)):
                 if share:
-                    numbers = [(at(one, place), share * one.length) for one in intervals]
+                    time = end if place == 1.0 else begin + place * length
+                    numbers = np.stack((time, share * length), axis=1)
                     for member in members.values():
                         relay.add(member.calls(name, member.K), numbers)
         for calls in closing:

@@ -23,7 +23,11 @@ from motes.group.sums import RECORDS, Packed, Places, Plan, Sums
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, arrange, common_grid, wrapped
 from motes.interact.clusters import RADIUS, WANTED, Room, cluster_lists, particle_lists
+from motes.jit import BRIEF
 from motes.repeat import Relay, Repeat
+
+SELDOM = 8
+"""Builds of lists from one order of rows to the next, where all rows are in a cache."""
 
 ALIKE = 1.5
 """Ratio of reaches up to which laws share lists."""
@@ -129,8 +133,17 @@ class Nearby:
         memory.lists[k] = replace(settled, settled=True)
 
     def _build(self, k: int, bodies: dict[str, Body], memory: Lasting, step: int) -> None:
+        """Build lists of a class. Few rows, which are in a cache wherever they are, are brought into
+        the order of cells at some builds only."""
         rooms = {p: memory.rooms.setdefault((k, *p), Room()) for p in self.classes[k].pairs}
-        memory.lists[k] = replace(self.build(self.classes[k], bodies, rooms), step=step)
+        built, kept = self.build(self.classes[k], bodies, rooms), memory.rooms.get((k,), {})
+        marks = {}
+        for name, arranged in built.arranged.items():
+            if name in kept and len(kept[name]) == arranged.order.size:
+                marks[name] = kept[name]  # To be written when lists of particles are chosen.
+        few = sum(arranged.order.size for arranged in built.arranged.values()) <= BRIEF
+        settled = few and memory.builds % SELDOM != 0
+        memory.lists[k] = replace(built, step=step, marks=marks, settled=settled)
         memory.builds += 1
 
     def build(
@@ -196,13 +209,13 @@ class Nearby:
 
     def plans(
         self, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting
-    ) -> list[Callable[[Relay, Sequence[int]], None]] | None:
+    ) -> list[Callable[[Relay, NDArray[Any]], None]] | None:
         """What `push` would do until lists of clusters do not hold any more, to be appended to a
         relay with the numbers, by round, that stop it then. None where that cannot be said
         beforehand."""
         if self.swarm is not None or memory.untidy or len(memory.lists) != len(self.classes):
             return None
-        found: list[Callable[[Relay, Sequence[int]], None]] = []
+        found: list[Callable[[Relay, NDArray[Any]], None]] = []
         for k, (shared, lists) in enumerate(zip(self.classes, memory.lists, strict=True)):
             plan = self._plans.get(k)
             if plan is None or lists is None or not lists.settled or shared.every:

@@ -4,7 +4,7 @@ and done by kernels, so that a group glides on without Python."""
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -120,17 +120,16 @@ class Renewal:
         return float(self.bounds[HELD])
 
     def add(
-        self, relay: Relay, shared: Class, found: Lists, time: float, numbers: Sequence[int]
+        self, relay: Relay, shared: Class, found: Lists, time: float, numbers: NDArray[np.int64]
     ) -> None:
-        """Append the calls, which stop the relay with the round's number."""
+        """Append the calls, which stop the relay with the round's number (rounds, 1)."""
         self.bounds[[REACH, LISTED]] = shared.reach(time), found.radius
         self.bounds[[MARGIN, HELD]] = shared.margin(found, time), found.short_radius
-        given = [(number,) for number in numbers]
-        relay.add(self._judge, given)
+        relay.add(self._judge, numbers)
         if self.bounds[OWNED] > 0:
             for calls in self._choose:
                 relay.add(calls)
-            relay.add(self._verify, given)
+            relay.add(self._verify, numbers)
             relay.add(self._commit)
             for calls in self._marks:
                 relay.add(calls)

@@ -101,10 +101,10 @@ class Plan:
             call()
 
     def relay(
-        self, shared: Class, rooms: dict[Any, Any], relay: Relay, numbers: Sequence[int]
+        self, shared: Class, rooms: dict[Any, Any], relay: Relay, numbers: Array
     ) -> None:
         """Append the evaluation to a relay. Lists of particles are shortened anew where they must be;
-        where that cannot be, the relay stops with the round's number before the sums."""
+        where that cannot be, the relay stops with the round's number (rounds, 1) before the sums."""
         for call in self.places.calls:
             assert isinstance(call, Repeat)  # Else the plan would not be kept.
             relay.add(call)
