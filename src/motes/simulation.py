@@ -293,11 +293,12 @@ class Simulation:
 
     @property
     def _may_glide(self) -> bool:
-        """Whether steps may be taken together: of systems that do not interact, in open space, or of
-        one group."""
+        """Whether steps may be taken together: of systems that do not interact, in open space, or
+        of one group."""
         if not self._groups:
             return not self._closed
-        return len(self._groups) == 1 and not any(self._alone.values()) and self._groups[0].glide.possible
+        one = len(self._groups) == 1 and not any(self._alone.values())
+        return one and self._groups[0].glide.possible
 
     def _wraps(self, state: State) -> list[Repeat]:
         """Calls that take all particles back into the periodic box."""

@@ -1,8 +1,8 @@
 """Several steps of a group in one pass, while lists hold and particles do nothing but move.
 
 A step of ten thousand particles lasts a millisecond, and has some ten kernels; here those of a few
-steps are a relay, with nothing between them. Where lists do not hold any more it stops, and the step
-is finished kernel by kernel: results are those of single steps, to the last bit.
+steps are a relay, with nothing between them. Where lists of clusters do not hold any more it stops,
+and the step is finished kernel by kernel: results are those of single steps, to the last bit.
 """
 
 # mypy: disallow-untyped-decorators=False

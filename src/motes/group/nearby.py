@@ -133,8 +133,11 @@ class Nearby:
         memory.lists[k] = replace(settled, settled=True)
 
     def _build(self, k: int, bodies: dict[str, Body], memory: Lasting, step: int) -> None:
-        """Build lists of a class. Few rows, which are in a cache wherever they are, are brought into
-        the order of cells at some builds only."""
+        """Build lists of a class.
+
+        Few rows, which are in a cache wherever they are, are brought into the order of cells at
+        some builds only.
+        """
         rooms = {p: memory.rooms.setdefault((k, *p), Room()) for p in self.classes[k].pairs}
         built, kept = self.build(self.classes[k], bodies, rooms), memory.rooms.get((k,), {})
         marks = {}

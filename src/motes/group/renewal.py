@@ -1,5 +1,7 @@
-"""Whether lists of particles still hold, and if not, shorter ones from the lists of clusters: decided
-and done by kernels, so that a group glides on without Python."""
+"""Lists of particles that are chosen anew from those of clusters where they do not hold any more.
+
+Kernels decide that and do it, so that a group glides on without Python.
+"""
 
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
@@ -16,8 +18,8 @@ from motes.jit import STRICT, even_blocks, jit
 from motes.repeat import Relay, Repeat
 
 REACH, LISTED, MARGIN, HELD, OWNED = range(WANTED + 1, WANTED + 6)
-"""Places in `bounds` [m]: the laws' reach, the radius of the lists of clusters, how far two ways may
-go together, within what lists of particles hold, and whether their memory may be written to."""
+"""Places in `bounds` [m]: the laws' reach, the radius of the lists of clusters, how far two ways
+may go together, within what lists of particles hold, and whether they may be written to."""
 
 BOUNDS = ("bounds",)
 """Name of `bounds` among the rooms of a class."""

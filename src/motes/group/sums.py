@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from motes.compile.pairs import Law
 from motes.compile.text import AXES
 from motes.group.lasting import Body, Class, Lists
-from motes.interact.arrange import Arranged, Box, pack, pack_images, packed_values
 from motes.group.renewal import Renewal
+from motes.interact.arrange import Arranged, Box, pack, pack_images, packed_values
 from motes.jit import BRIEF, even_blocks
 from motes.memory import allocate
 from motes.repeat import Relay, Repeat, Repeats
@@ -100,11 +100,12 @@ class Plan:
         for call in self._sums:
             call()
 
-    def relay(
-        self, shared: Class, rooms: dict[Any, Any], relay: Relay, numbers: Array
-    ) -> None:
-        """Append the evaluation to a relay. Lists of particles are shortened anew where they must be;
-        where that cannot be, the relay stops with the round's number (rounds, 1) before the sums."""
+    def relay(self, shared: Class, rooms: dict[Any, Any], relay: Relay, numbers: Array) -> None:
+        """Append the evaluation to a relay.
+
+        Lists of particles are chosen anew where they must be; where that cannot be, the relay stops
+        with the round's number (rounds, 1) before the sums.
+        """
         for call in self.places.calls:
             assert isinstance(call, Repeat)  # Else the plan would not be kept.
             relay.add(call)

@@ -26,7 +26,7 @@ from motes.memory import afford, allocate
 from motes.repeat import Repeat
 
 RADIUS, WANTED = range(2)
-"""Places in the bounds of lists of particles: their radius [m], and whether they are to be chosen."""
+"""Places in the bounds of lists of particles: their radius [m], and whether they are wanted."""
 
 LONGER = 2 * LANES
 """Entries by which the longest list may grow, until who reads lists needs more room."""
@@ -35,8 +35,10 @@ CANDIDATES = 1024
 """Candidates of a cluster that there is room for at first."""
 
 NEAR_CLUSTER, NEAR_PARTICLE, SPARE = 512, 96, 4096
-"""Entries that new lists have room for: of a cluster, of a particle, and of a part besides. They are
-those of a liquid and some more; room that is not written to is no memory yet."""
+"""Entries that new lists have room for: of a cluster, of a particle, and of a part besides.
+
+They are those of a liquid and some more; room that is not written to is no memory yet.
+"""
 
 
 class Part(NamedTuple):
@@ -292,9 +294,9 @@ def particle_lists(
 ) -> Calls:  # fmt: skip
     """Each particle's neighbours within a radius [m] of places (slots + 1, 4), without itself.
 
-    `bounds` holds the radius and that it is wanted, `itself` says that particles are among the others; entries go into `room` as before. Returns
-    the lists, `Part`s, as last arguments of calls: those of before where they are in the same
-    memory.
+    `bounds` holds the radius and that it is wanted, `itself` says that particles are among the
+    others; entries go into `room` as before. Returns the lists, `Part`s, as last arguments of
+    calls: those of before where they are in the same memory.
     """
     real = own.dtype.type
     if room.lists is not lists:

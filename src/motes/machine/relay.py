@@ -1,8 +1,8 @@
 """Calls of several kernels, one kernel after another, on a few threads without Python between them.
 
-A phase is the calls of one kernel, which threads take from a counter; the next phase begins when all
-of them are done, and all phases come round several times. A thread waits awake: where a phase lasts
-some microseconds, to wake another one would take longer than the phase.
+A phase is the calls of one kernel, which threads take from a counter; the next phase begins when
+all of them are done, and all phases come round several times. A thread waits awake: where a phase
+lasts some microseconds, to wake another one would take longer than the phase.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from motes.machine.target import has, loaded, object_code
 
 ROW = 5
 """Numbers of a phase in the table: addresses of the kernel's door and of the first pack of
-arguments, bytes of a pack, how many calls, bytes from the packs of one round to those of the next."""
+arguments, bytes of a pack, how many calls, bytes from one round's packs to those of the next."""
 
 COUNTERS = 2
 """Numbers of a phase in a round: how many calls were taken, how many are done."""
@@ -99,10 +99,13 @@ finished:
 
 @cache
 def runner() -> Any:
-    """The function of a table and how many phases it has, of counters and how many phases that is in
-    all rounds, of how many calls are to be done at most, and of the address of a number: where that
-    is not 0, no phase begins. It returns 0 when all is done, 1 after so many calls, 2 when it has
-    waited long for others'."""
+    """A function that threads run together.
+
+    Its arguments: a table and how many phases it has, counters and how many phases that is in all
+    rounds, how many calls are to be done at most, and the address of a number: where that is not 0,
+    no phase begins. It returns 0 when all is done, 1 after so many calls, 2 when it has waited long
+    for others'.
+    """
     pause = has("sse2")
     text = TEXT.replace("PAUSE", PAUSE if pause else "")
     if pause:
