@@ -10,6 +10,7 @@ from tests.plain.rk4 import rk4
 
 import motes
 import motes.compile.text
+import motes.step
 
 
 def jets(*, precision: str = "single", **options: Any) -> motes.Scene:
@@ -48,8 +49,11 @@ def test_the_result_does_not_depend_on_the_number_of_threads() -> None:
 
 
 @pytest.mark.parametrize("life", [None, 0.37, {"mean": 0.4, "spread": 0.1}])
-def test_steps_that_are_taken_together_are_those_taken_one_by_one(life: Any) -> None:
+def test_steps_that_are_taken_together_are_those_taken_one_by_one(
+    life: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The same bits, with a burst on the way, a rate that begins later, deaths, two systems."""
+    monkeypatch.setattr(motes.step, "GLIDING", 1 << 12)  # Less than a thread's rows.
 
     def dust(name: str, *emitters: Any, life: Any = None) -> motes.System:
         force = [motes.force.Gravity(), motes.force.Drag(), motes.force.Turbulence()]
