@@ -73,6 +73,19 @@ def test_steps_that_are_taken_together_are_those_taken_one_by_one(
     assert together.digest() == one_by_one.digest()
 
 
+@pytest.mark.parametrize("axis", range(6))
+@pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan])
+def test_the_first_particle_that_is_no_number_is_found(axis: int, bad: float) -> None:
+    """In any column and any block of rows, and not where numbers are only very large."""
+    rows = motes.Simulation(motes.Scene(systems=[motes.System("dust")]))._state.systems["dust"]
+    large = np.full((3, 70_000), 0.9 * np.finfo(np.float32).max, np.float32)
+    rows.append(large, large, 0.0, np.uint64(1))
+    assert rows.first_not_finite() is None
+    for row in (69_999, 65_536, 65_535, 7, 0):
+        (rows.position if axis < 3 else rows.velocity)[axis % 3, row] = bad
+        assert rows.first_not_finite() == row
+
+
 def cloud(force: list[Any], precision: str) -> motes.Simulation:
     """A thousand particles that do not move yet, at rest in a box."""
     box = motes.emit.Box(burst=[{"at": 0.0, "count": 1000}], size=(2, 2, 2), position=(0.5, 0, 0))
