@@ -312,7 +312,7 @@ def _kept(path: Path) -> bytes | None:
 def _keep(path: Path, body: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        with written_whole(path) as file:
+        with written_whole(path, lasting=False) as file:  # A disk takes its time; see `_kept`.
             file.write(body + hashlib.sha256(body).digest())
     except (OSError, OutputError):
         pass  # A full or read-only disk costs the next start some time, nothing else.
