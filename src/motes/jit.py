@@ -23,11 +23,19 @@ from typing import Any
 
 from motes.errors import OutputError, SceneError
 from motes.files import written_whole
-from motes.pool import available_processors, blocks, even_blocks, share, share_out, threads
+from motes.pool import (
+    BRIEF,
+    available_processors,
+    blocks,
+    even_blocks,
+    share,
+    share_out,
+    threads,
+)  # fmt: skip
 
 __all__ = [
-    "EXACT", "FAST", "STRICT", "Calls", "Kernel", "available_processors", "blocks", "bound",
-    "cache_folder", "each", "even_blocks", "jit", "listen", "share", "threads",
+    "BRIEF", "EXACT", "FAST", "STRICT", "Calls", "Kernel", "available_processors", "blocks",
+    "bound", "cache_folder", "each", "even_blocks", "jit", "listen", "share", "threads",
 ]  # fmt: skip
 
 FAST = frozenset({"reassoc", "contract", "arcp", "nsz"})
@@ -198,20 +206,28 @@ def bound(kernel: Callable[..., Any], *arguments: Any) -> Callable[..., Any]:
 
 
 class Calls:
-    """The last arguments of many calls of a kernel, of the same types in all of them."""
+    """The last arguments of many calls of a kernel, of the same types in all of them.
 
-    def __init__(self, tails: Sequence[Sequence[Any]]) -> None:
-        self.tails = tails
+    Where they are arrays and plain numbers, and whoever makes them knows that their types are
+    `alike`, only the first are looked at.
+    """
+
+    def __init__(self, tails: Sequence[Sequence[Any]], alike: bool = False) -> None:
+        self.tails, self._alike = tails, alike
         self._spread: tuple[list[Any], list[list[Any]]] | None = None
 
     def spread(self) -> tuple[list[Any], list[list[Any]]]:
         """What the arguments' types follow from, and their numbers for every call."""
-        from motes.machine.door import spread
+        from motes.machine.door import numbers_of, spread
 
         if self._spread is None:
             first: list[Any] = []
             lasts: list[list[Any]] = []
-            for tail in self.tails:
+            if self._alike and self.tails:
+                for argument in self.tails[0]:
+                    spread(argument, first, [])
+                lasts = list(map(numbers_of, self.tails))
+            for tail in self.tails[len(lasts) :]:
                 key: list[Any] = []
                 lasts.append([])
                 for argument in tail:
@@ -296,7 +312,7 @@ def _kept(path: Path) -> bytes | None:
 def _keep(path: Path, body: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        with written_whole(path) as file:
+        with written_whole(path, lasting=False) as file:  # A disk takes its time; see `_kept`.
             file.write(body + hashlib.sha256(body).digest())
     except (OSError, OutputError):
         pass  # A full or read-only disk costs the next start some time, nothing else.

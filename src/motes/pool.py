@@ -11,6 +11,7 @@ import os
 import threading
 from collections import deque
 from collections.abc import Callable
+from time import sleep
 from typing import Any
 
 _threads = 0
@@ -35,10 +36,14 @@ class _Helper:
         self._begun.release()
 
     def end(self) -> BaseException | None:
-        """Wait until the work is done; returns what it raised, and again None after that."""
+        """Wait until the work is done; returns what it raised, and again None after that.
+
+        Work that has not begun is taken back: there is nothing left to do.
+        """
         if self._work is None:
             return None
-        self._done.acquire()
+        if not self._begun.acquire(blocking=False):
+            self._done.acquire()
         fault, self._work, self._fault = self._fault, None, None
         _idle.append(self)
         return fault
@@ -154,10 +159,38 @@ def share_out(run: Callable[[Any, int], None], count: int) -> None:
     _together(work, count, lambda: setattr(counter, "value", count))
 
 
+WAITING = 2
+"""What a function for `share_phases` returns when it has waited long for other threads."""
+
+
+def share_phases(run: Callable[[], int], count: int, stop: Callable[[], Any]) -> None:
+    """Run what does some calls, as long as it returns anything but 0, on as many threads as there
+    are calls at once; `stop` lets no more begin."""
+
+    def work() -> None:
+        while left := run():
+            if left == WAITING:
+                _give_way()
+
+    _together(work, count, stop)
+
+
+def _give_way() -> None:
+    """Let others have the processor: somebody may need it who is waited for."""
+    if hasattr(os, "sched_yield"):
+        os.sched_yield()
+    else:
+        sleep(0)
+
+
+BRIEF = 1 << 14
+"""Rows of a loop of a nanosecond a row that are done before a second thread has woken up."""
+
+
 def even_blocks(rows: int) -> list[tuple[int, int]]:
-    """Blocks of rows for a loop of a nanosecond a row: one where a second thread would cost more
-    than it brings, else many, so that threads have equal shares."""
-    return blocks(rows, 1 << 14 if rows <= 1 << 14 else 1 << 13)
+    """Blocks of rows for a loop of a nanosecond a row: several even for few rows, so that threads
+    that are awake have equal shares."""
+    return blocks(rows, min(max(-(-rows // 8), 1 << 11), 1 << 13))
 
 
 def blocks(rows: int, size: int) -> list[tuple[int, int]]:

@@ -193,7 +193,8 @@ def _kept(
             if frame.index == numbers[0] > 1:  # The frames before have told of theirs.
                 before = frame.time - 1 / simulation.scene.film.fps
                 told = sum(1 for one in captures if one["time"] <= before * (1 + 1e-12))
-            store.note(frame.index, simulation.measure(), captures[told:])
+            noted = frame.index, simulation.measure(), captures[told:]
+            follower.add(lambda noted: store.note(*noted), noted)
             told = len(captures)
         yield frame
 

@@ -20,13 +20,14 @@ from motes.errors import SceneError, SimulationError, likely
 from motes.frame import Frame
 from motes.group import Group, named_systems
 from motes.group.capture import CAPTURE
+from motes.group.glide import TOGETHER as GLIDE
 from motes.group.lasting import Lasting
 from motes.integrate import method
 from motes.interact.arrange import Box, wrap, wrapped
-from motes.jit import even_blocks
+from motes.jit import BRIEF, even_blocks
 from motes.philox import channel
 from motes.record.energy import Matter, Measures, measure
-from motes.repeat import Repeats
+from motes.repeat import Repeat, Repeats
 from motes.scene.address import component_address
 from motes.scene.document import Scene, System
 from motes.state import Particles, State
@@ -261,7 +262,7 @@ class Simulation:
     def _run(self, steps: int, progress: Callable[[Simulation], None] | None) -> None:
         last = self.steps + steps
         while self.steps < last:
-            if progress is None and self._glides(min(last - self.steps, TOGETHER)):
+            if progress is None and self._glides(last - self.steps):
                 continue
             begin, end = self._step_begin(self._state), self._step_begin(self._state, 1)
             self._advance(self._state, Interval(begin, end))
@@ -269,20 +270,45 @@ class Simulation:
                 progress(self)
 
     def _glides(self, steps: int) -> bool:
-        """Take several steps at once, if all particles only move in them."""
-        state = self._state
-        times = [self._step_begin(state, k) for k in range(steps + 1)]
-        if steps < 2 or self._groups or self._closed:
+        """Take several steps at once, at most so many, if all particles only move in them."""
+        state, steps = self._state, min(steps, GLIDE if self._groups else TOGETHER)
+        if steps < 2 or not self._may_glide:
             return False
+        begin, length = state.number - self._lead_in, self.scene.step
+        times = [(begin + k) * length for k in range(steps + 1)]
         span = times[0], times[-1], self.scene.step
         if not all(s.undisturbed(state.systems[n], *span) for n, s in self._steppers.items()):
             return False
-        intervals = [Interval(*pair) for pair in pairwise(times)]
-        for name, stepper in self._steppers.items():
-            stepper.glide(state.systems[name], intervals)
-            self.work += steps * state.systems[name].count
+        if self._groups:
+            memory, closing = state.memories[0], self._wraps(state) if self._closed else []
+            assert isinstance(memory, Lasting)
+            steps = self._groups[0].glide(state.systems, times, memory, closing)
+        else:
+            intervals = [Interval(*pair) for pair in pairwise(times)]
+            for name, stepper in self._steppers.items():
+                stepper.glide(state.systems[name], intervals)
+        self.work += steps * self.count
         state.number += steps
-        return True
+        return steps > 0
+
+    @property
+    def _may_glide(self) -> bool:
+        """Whether steps may be taken together: of systems that do not interact, in open space, or
+        of one group."""
+        if not self._groups:
+            return not self._closed
+        one = len(self._groups) == 1 and not any(self._alone.values())
+        return one and self._groups[0].glide.possible
+
+    def _wraps(self, state: State) -> list[Repeat]:
+        """Calls that take all particles back into the periodic box."""
+        return [
+            self._calls(
+                ("wrap", name), wrap, (rows.position, *self._edges), even_blocks(rows.count),
+                rows.count <= BRIEF,
+            )
+            for name, rows in state.systems.items()
+        ]  # fmt: skip
 
     def _step_begin(self, state: State, ahead: int = 0) -> float:
         """Time at which a state's next step begins, or a later one."""
@@ -297,9 +323,8 @@ class Simulation:
             assert isinstance(memory, Lasting)
             group.step(state.systems, interval, memory)
         if self._closed:
-            for name, rows in state.systems.items():
-                head = rows.position, *self._edges
-                self._calls(("wrap", name), wrap, head, even_blocks(rows.count))()
+            for calls in self._wraps(state):
+                calls()
         state.number += 1
 
     def _steps_before(self, time: float) -> int:

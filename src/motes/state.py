@@ -8,14 +8,14 @@ k-th birth of an emitter is a function of time.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from motes.jit import jit, share
+from motes.jit import blocks, jit, share
 from motes.memory import allocate
 from motes.philox import hash_id
 
@@ -122,21 +122,25 @@ class Particles:
         self.deaths += gone
         return gone
 
-    def reorder(self, order: NDArray[np.int32]) -> None:
-        """Move rows: row k becomes what row `order[k]` was, for the first of the rows."""
-        arrays = self.arrays()
+    def reorder(self, order: NDArray[np.int32], also: Iterable[NDArray[Any]] = ()) -> None:
+        """Move rows: row k becomes what row `order[k]` was, for the first of the rows, and in other
+        arrays that go with them."""
+        arrays = [*self.arrays(), *also]
         share(lambda k: _move(arrays[k], order, np.empty(order.size, arrays[k].dtype)), len(arrays))
 
     def first_not_finite(self) -> int | None:
         """The first row whose position or velocity is infinite or not a number, or None."""
-        rows = [*self.position, *(self.velocity if self.moves else ())]
-        found = [self.count] * len(rows)
+        parts = blocks(self.count, 1 << 16)
+        found = [self.count] * len(parts)
+        velocity = self.velocity if self.moves else self.position
 
         def search(k: int) -> None:
-            found[k] = _first_not_finite(rows[k][: self.count])
+            low, high = parts[k]
+            first = _first_not_finite(self.position, velocity, low, high)
+            found[k] = first if first < high else self.count
 
-        share(search, len(rows))
-        first = min(found)
+        share(search, len(parts))
+        first = min(found, default=self.count)
         return first if first < self.count else None
 
     def copy(self) -> Particles:
@@ -217,15 +221,17 @@ def _compact(array, dead, first, count):  # type: ignore[no-untyped-def]
 
 
 @jit
-def _first_not_finite(array):  # type: ignore[no-untyped-def]
-    """Index of the first element that is infinite or not a number, or the size."""
-    if array.size == 0:
-        return 0
-    none = array[0] * 0
-    for i in range(array.size):  # A sum is SIMD, a search is not; 0 times infinity is no number.
-        none += array[i] * 0
+def _first_not_finite(position, velocity, low, high):  # type: ignore[no-untyped-def]
+    """Index of the first column with an element that is infinite or not a number, or `high`."""
+    x, y, z = position[0][low:high], position[1][low:high], position[2][low:high]
+    vx, vy, vz = velocity[0][low:high], velocity[1][low:high], velocity[2][low:high]
+    none = x[0] * 0
+    for i in range(x.size):  # A sum is SIMD, a search is not; 0 times infinity is no number.
+        none += (x[i] + y[i] + z[i]) * 0 + (vx[i] + vy[i] + vz[i]) * 0
     if none != 0:
-        for i in range(array.size):
-            if not abs(array[i]) < np.inf:
-                return i
-    return array.size
+        for i in range(x.size):
+            place = (abs(x[i]) < np.inf) & (abs(y[i]) < np.inf) & (abs(z[i]) < np.inf)
+            motion = (abs(vx[i]) < np.inf) & (abs(vy[i]) < np.inf) & (abs(vz[i]) < np.inf)
+            if not (place & motion):
+                return low + i
+    return high

@@ -29,6 +29,9 @@ LARGEST_BLOCK = 1 << 18
 SMALLEST_BLOCK = 1 << 14
 """Rows below which a second thread costs more than it brings."""
 
+GLIDING = 1 << 15
+"""Rows that take several steps before the next ones do: about what a core's cache keeps."""
+
 MANY = 2048
 """Newborns in a step from which a SIMD kernel of their own is worth its compilation."""
 
@@ -104,8 +107,10 @@ class Stepper:
         step, parts = self._bound(self.system.straight, rows), _parts(rows.count, 1)
 
         def straight(k: int) -> None:
-            for interval in intervals:
-                step(interval.begin, interval.end, *parts[k])
+            first, last = parts[k]
+            for low in range(first, last, GLIDING):  # Whole chunks of the pass, so the same bits.
+                for interval in intervals:
+                    step(interval.begin, interval.end, low, min(low + GLIDING, last))
 
         share(straight, len(parts))
 

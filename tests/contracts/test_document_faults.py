@@ -49,14 +49,15 @@ def test_a_renamed_key_is_reported_at_its_line(name: str) -> None:
     first, stride = (0, 1) if name == "rich" else (len(name) % 5, 5)
     count = 0
     for line, key, text in islice(planted(TEXTS[name]), first, None, stride):
-        if "not TOML" in str(problems(text)):
+        faults = problems(text)
+        if "not TOML" in str(faults):
             continue  # Tables of a list that has lost its header.
-        found = {p.line for p in problems(text)}
+        found = {p.line for p in faults}
         if key == "type" and line not in found:
             # What is missing is reported where its table begins.
             before = text.split("\n")[: line - 1]
             line = max(i + 1 for i, other in enumerate(before) if other.startswith("["))
-        assert line in found, (line, key, problems(text))
+        assert line in found, (line, key, faults)
         count += 1
     assert count > (100 if name == "rich" else 3)
 

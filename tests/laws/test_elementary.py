@@ -27,6 +27,7 @@ STATED = {
     "cos": (2.5, 2.5),
     "tanh": (3, 3),
     "phi1": (3, 3),
+    "damped_time": (3, 3),
     "atan2": (3, 3),
     "pow": (2, 4),
     "sqrt": (0.5, 0.5),
@@ -36,6 +37,9 @@ STATED = {
 wide_long_double = pytest.mark.skipif(
     np.finfo(np.longdouble).nmant <= 52, reason="long double is double here"
 )
+
+
+OF_TWO = ("pow", "atan2", "damped_time")
 
 
 def arguments_of(name, precision):
@@ -53,6 +57,7 @@ def arguments_of(name, precision):
         ],
         "tanh": lambda: [np.append(spread(-20, 20, half), spread(-0.5, 0.5, half))],
         "phi1": lambda: [np.append(spread(0, 200, half), np.exp(spread(-30, 3, half)))],
+        "damped_time": lambda: [np.exp(spread(-30, 3)), np.exp(spread(-9, 1))],
         "atan2": lambda: [random.normal(size=COUNT), random.normal(size=COUNT)],
         "pow": lambda: [np.exp(spread(-5, 5)), spread(-large / 5.1, large / 5.1)],
         "sqrt": lambda: [np.exp(spread(1 - large, large))],
@@ -87,6 +92,9 @@ def reference(name, arguments):
     if name == "phi1":
         (z,) = arguments
         return -np.expm1(-z) / z
+    if name == "damped_time":
+        rate, h = arguments
+        return -np.expm1(-rate * h) / rate
     return ELEMENTARY[name](*arguments)
 
 
@@ -107,7 +115,7 @@ def test_errors_are_below_what_the_docstrings_state(name, precision, flags):
 
 
 @pytest.mark.parametrize("precision", REAL)
-@pytest.mark.parametrize("name", [name for name in STATED if name not in ("pow", "atan2")])
+@pytest.mark.parametrize("name", [name for name in STATED if name not in OF_TWO])
 def test_limits(name, precision):
     """At zero, at infinity, beyond the range, and for NaN the values are NumPy's."""
     x = [0, 1, -1, np.inf, -np.inf, np.nan, 0.5, -0.5, 2, -3, 1e-40, 100, -100, 700, -700]
@@ -135,6 +143,16 @@ def test_limits_of_two_arguments(name, precision):
 
 
 @pytest.mark.parametrize("precision", REAL)
+def test_a_damped_time_without_damping_is_the_time_and_for_ever_one_over_the_rate(precision):
+    rate = [0, 1e-40, 1e-37, 1e-12, 2, 1e30, np.inf, np.nan, 3, 0, -1]
+    h = [0.5, 0.25, 1e20, 1e-3, np.inf, 1, 2, 1, 0, 0, 0.5]
+    expected = [0.5, 0.25, 1e20, 1e-3, 0.5, 1e-30, 0, np.nan, 0, 0, np.expm1(0.5)]
+    np.testing.assert_allclose(
+        computed("damped_time", [rate, h], precision), expected, 4 * np.finfo(REAL[precision]).eps
+    )
+
+
+@pytest.mark.parametrize("precision", REAL)
 def test_exp_underflows_gradually(precision):
     """Between the smallest normal number and 0 the error is below one smallest number."""
     info = np.finfo(REAL[precision])
@@ -155,7 +173,7 @@ def test_sine_and_cosine_stay_within_one_where_they_have_no_digits_left(name):
 @pytest.mark.parametrize("name", ELEMENTARY)
 def test_single_precision_has_no_double_no_call_and_runs_in_wide_registers(name):
     function = ELEMENTARY[name].compiled("single")
-    count = 2 if name in ("pow", "atan2") else 1
+    count = 2 if name in OF_TWO else 1
     run = loop_over(function, count)
     code = run.llvm(*[np.zeros(64, np.float32)] * (count + 1))
     body = code[code.index("\ndefine") :].split("\n}")[0]

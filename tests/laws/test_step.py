@@ -10,6 +10,7 @@ from tests.plain.rk4 import rk4
 
 import motes
 import motes.compile.text
+import motes.step
 
 
 def jets(*, precision: str = "single", **options: Any) -> motes.Scene:
@@ -48,8 +49,11 @@ def test_the_result_does_not_depend_on_the_number_of_threads() -> None:
 
 
 @pytest.mark.parametrize("life", [None, 0.37, {"mean": 0.4, "spread": 0.1}])
-def test_steps_that_are_taken_together_are_those_taken_one_by_one(life: Any) -> None:
+def test_steps_that_are_taken_together_are_those_taken_one_by_one(
+    life: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The same bits, with a burst on the way, a rate that begins later, deaths, two systems."""
+    monkeypatch.setattr(motes.step, "GLIDING", 1 << 12)  # Less than a thread's rows.
 
     def dust(name: str, *emitters: Any, life: Any = None) -> motes.System:
         force = [motes.force.Gravity(), motes.force.Drag(), motes.force.Turbulence()]
@@ -67,6 +71,19 @@ def test_steps_that_are_taken_together_are_those_taken_one_by_one(life: Any) -> 
     assert together.work == one_by_one.work
     assert together.time == one_by_one.time
     assert together.digest() == one_by_one.digest()
+
+
+@pytest.mark.parametrize("axis", range(6))
+@pytest.mark.parametrize("bad", [np.inf, -np.inf, np.nan])
+def test_the_first_particle_that_is_no_number_is_found(axis: int, bad: float) -> None:
+    """In any column and any block of rows, and not where numbers are only very large."""
+    rows = motes.Simulation(motes.Scene(systems=[motes.System("dust")]))._state.systems["dust"]
+    large = np.full((3, 70_000), 0.9 * np.finfo(np.float32).max, np.float32)
+    rows.append(large, large, 0.0, np.uint64(1))
+    assert rows.first_not_finite() is None
+    for row in (69_999, 65_536, 65_535, 7, 0):
+        (rows.position if axis < 3 else rows.velocity)[axis % 3, row] = bad
+        assert rows.first_not_finite() == row
 
 
 def cloud(force: list[Any], precision: str) -> motes.Simulation:

@@ -214,9 +214,8 @@ class _Writer:
         lines = f"    ax, ay, az, r, bx, by, bz = pushed{call}\n"
         if self.motion.limits:
             lines += f"    ax, ay, az = limited{call[:-1]}, ax, ay, az)\n"
-        lines += f"    g = F({share!r}) * h\n"
-        if self.motion.relaxes:
-            lines += "    g *= phi1(r * g)\n"
+        time = f"F({share!r}) * h"
+        lines += f"    g = {f'damped_time(r, {time})' if self.motion.relaxes else time}\n"
         return lines + "".join(
             f"    v{axis} += g * (a{axis} + b{axis} - r * v{axis})\n" for axis in AXES
         )

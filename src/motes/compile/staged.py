@@ -41,7 +41,7 @@ def write_staged(text: Text, motion: Motion) -> None:
         pushed += f"        ax, ay, az = limited{call[:-1]}, ax, ay, az)\n"
     flows = f"        ux, uy, uz = carried{call}\n" if motion.flows else ""
     if isinstance(motion.method, Splitting):
-        change = "        g = phi1(r * h) * h\n" if motion.relaxes else "        g = h\n"
+        change = "        g = damped_time(r, h)\n" if motion.relaxes else "        g = h\n"
         change += "".join(f"        v{a}[i] += g * (a{a} + b{a} - r * v{a}[i])\n" for a in AXES)
         head = "(Y, birth, columns, push, K, t, dt, lo, hi):\n    h = F(dt)\n"
         text.add(f"@kernel\ndef kick{head}{slices}{begin}{pushed}{change}")

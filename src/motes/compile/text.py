@@ -127,7 +127,7 @@ class Text:
         exact = STRICT if self.strict else None
         for name, function in self.translation.elementary.items():
             scope[name] = function.compiled(self.precision, exact)
-        for name in ("phi1", "sqrt", "sin", "cos"):
+        for name in ("damped_time", "sqrt", "sin", "cos"):
             scope[name] = ELEMENTARY[name].compiled(self.precision, exact)
         if self.values.splines:
             from motes.control.spline_kernels import spline_at

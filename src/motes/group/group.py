@@ -18,6 +18,7 @@ from motes.errors import SceneError
 from motes.group.capture import Captures
 from motes.group.constrain import Constraints, Ground
 from motes.group.contacts import Contacts, Planes
+from motes.group.glide import Glide
 from motes.group.implicit import backward_difference, one_by_one, together
 from motes.group.lasting import Body, Lasting
 from motes.group.members import Bodies, Member, Movers, Occasion
@@ -81,6 +82,7 @@ class Group:
             )
         if not all(motion.inertial for motion in motions):
             raise SceneError(f"{who} and must have velocities: give them a force besides flows.")
+        self.glide = Glide(self)
 
     def _nearby(self, precision: str) -> Nearby:
         laws = []
@@ -105,7 +107,7 @@ class Group:
             memory.kept, memory.push = kept, None
         begin = partial(self._bodies, systems, alive, interval.begin)
         self.nearby.settle(kept, begin, memory)
-        members = {name: self._member(name, systems[name], alive[name], memory) for name in alive}
+        members = {name: self.member(name, systems[name], alive[name], memory) for name in alive}
         self._integrate(members, interval, memory)
         for name, stepper in self.steppers.items():
             if stepper.system.surfaces is not None:
@@ -151,7 +153,8 @@ class Group:
             found[name] = Body(stepper, rows, alive[name], rows.motion, time)
         return found
 
-    def _member(self, name: str, rows: Particles, alive: int, memory: Lasting) -> Member:
+    def member(self, name: str, rows: Particles, alive: int, memory: Lasting) -> Member:
+        """A system as it takes part in a step, with the push that was last given to it."""
         stepper = self.steppers[name]
         flies = stepper.system.surfaces is not None
         member, push = self._members.get(name), memory.pushes.get(name, NOTHING[rows.real])

@@ -195,7 +195,11 @@ class Class:
             return False
         if self.every:
             return step - found.step < self.every
-        return 2 * moved <= (found.short_radius - self.reach(time)) * CAUTION
+        return 2 * moved <= self.margin(found, time)
+
+    def margin(self, found: Lists, time: float) -> float:
+        """Ways [m] of two particles, together, up to which lists of particles miss no pair."""
+        return (found.short_radius - self.reach(time)) * CAUTION
 
     def short_radius(self, found: Lists, moved: float, time: float) -> float:
         """Radius for lists of particles that are chosen now, after a way [m] since the build.

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from motes.group.contacts import Planes
 from motes.group.lasting import Body
 from motes.interact.arrange import Box
-from motes.jit import even_blocks
-from motes.repeat import Repeats
+from motes.jit import BRIEF, even_blocks
+from motes.repeat import Repeat, Repeats
 from motes.state import Particles
 from motes.step import Stepper
 
@@ -79,9 +79,13 @@ class Member:
 
     def each(self, name: str, *arguments: Any, numbers: Sequence[float]) -> None:
         """Run one of the system's staged kernels over all rows that were alive."""
+        self.calls(name, *arguments)(*numbers)
+
+    def calls(self, name: str, *arguments: Any) -> Repeat:
+        """The calls of one of the system's staged kernels for all rows that were alive."""
         kernel, rows = self.stepper.system.staged(name), self.rows
         head = self.y, rows.birth, rows.columns, self.push, *arguments
-        self._calls(name, kernel, head, self._parts)(*numbers)
+        return self._calls(name, kernel, head, self._parts, self.alive <= BRIEF)
 
     def body(self, time: float) -> Body:
         """The system as laws of limited reach see it."""

@@ -17,7 +17,7 @@ from motes.compile.staged import combine
 from motes.group.lasting import Lasting
 from motes.group.members import Member
 from motes.group.partners import partners, values
-from motes.jit import even_blocks, share
+from motes.jit import each, even_blocks
 from motes.step import Interval
 from motes.tableau import Explicit, Nystrom, Splitting
 
@@ -26,14 +26,15 @@ if TYPE_CHECKING:
 
 
 def split(
-    group: Group, members: dict[str, Member], interval: Interval, method: Splitting, memory: Lasting
-) -> None:
-    """Kicks and drifts in turn; laws of velocities hold between them."""
+    group: Group, members: dict[str, Member], interval: Interval, method: Splitting,
+    memory: Lasting, first: int = 0,
+) -> None:  # fmt: skip
+    """Kicks and drifts in turn, from the first turn on; laws of velocities hold between them."""
     h = interval.length
     before = {
         name: m.y[3:, : m.alive].copy() for name, m in members.items() if group.constraints.laws
     }
-    for kick, drift, place in _turns(method):
+    for kick, drift, place in turns(method)[first:]:
         time = at(interval, place)
         if kick:
             group.interact(members, time, memory)
@@ -47,7 +48,7 @@ def split(
 
 
 @cache
-def _turns(method: Splitting) -> list[tuple[float, float, float]]:
+def turns(method: Splitting) -> list[tuple[float, float, float]]:
     """Kick, drift after it and place in the step of every turn."""
     return list(zip(method.kicks, (*method.drifts, 0.0), method.times, strict=True))
 
@@ -114,5 +115,4 @@ def combined(
     for name, member in members.items():
         parts, real = even_blocks(member.alive), member.y.dtype.type
         row = np.array(weights, float).astype(real)
-        arguments = (bases[name], slopes[name], row, real(h), member.y)
-        share(lambda k, a=arguments, p=parts: combine(*a, *p[k]), len(parts))  # type: ignore[misc]
+        each(combine, (bases[name], slopes[name], row, real(h), member.y), parts)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -18,10 +18,16 @@ from numpy.typing import NDArray
 from motes.compile.pairs import FORCE, POTENTIAL, VIRIAL, Law
 from motes.errors import SceneError, SimulationError
 from motes.group.lasting import Body, Class, Kept, Lasting, Lists
-from motes.group.sums import RECORDS, Call, Packed, Places, Plan, Sums
+from motes.group.renewal import bounds_in
+from motes.group.sums import RECORDS, Packed, Places, Plan, Sums
 from motes.group.swarm import Swarm
 from motes.interact.arrange import Box, arrange, common_grid, wrapped
-from motes.interact.clusters import Room, cluster_lists, particle_lists
+from motes.interact.clusters import RADIUS, WANTED, Room, cluster_lists, particle_lists
+from motes.jit import BRIEF
+from motes.repeat import Relay, Repeat
+
+SELDOM = 8
+"""Builds of lists from one order of rows to the next, where all rows are in a cache."""
 
 ALIKE = 1.5
 """Ratio of reaches up to which laws share lists."""
@@ -103,9 +109,7 @@ class Nearby:
         if self.swarm is None or any(name in shared.systems for shared in self.classes):
             return
         order = self.swarm.order(body)
-        body.rows.reorder(order)
-        if memory.push is not None:
-            memory.push[name][:] = memory.push[name][:, order]
+        body.rows.reorder(order, () if memory.push is None else memory.push[name])
 
     def _reorder(self, k: int, names: set[str], bodies: dict[str, Body], memory: Lasting) -> None:
         """Move rows into the order of one class's cells; all lists keep telling where they are."""
@@ -113,23 +117,36 @@ class Nearby:
         assert mine is not None
         for name in sorted(names):
             order = mine.arranged[name].order
-            bodies[name].rows.reorder(order)
-            place = np.empty_like(order)
-            place[order] = np.arange(place.size, dtype=np.int32)
+            bodies[name].rows.reorder(order, () if memory.push is None else memory.push[name])
+            itself = np.arange(order.size, dtype=np.int32)
             for i, other in enumerate(memory.lists):
                 if other is not None and name in other.arranged:
-                    there = other.arranged[name]
-                    there = there._replace(order=place[there.order])
+                    there, moved_there = other.arranged[name], itself
+                    if i != k:
+                        place = np.empty_like(order)
+                        place[order] = itself
+                        moved_there = place[there.order]
+                    there = there._replace(order=moved_there)
                     memory.lists[i] = replace(other, arranged={**other.arranged, name: there})
-            if memory.push is not None:
-                memory.push[name][:] = memory.push[name][:, order]
         settled = memory.lists[k]
         assert settled is not None
         memory.lists[k] = replace(settled, settled=True)
 
     def _build(self, k: int, bodies: dict[str, Body], memory: Lasting, step: int) -> None:
+        """Build lists of a class.
+
+        Few rows, which are in a cache wherever they are, are brought into the order of cells at
+        some builds only.
+        """
         rooms = {p: memory.rooms.setdefault((k, *p), Room()) for p in self.classes[k].pairs}
-        memory.lists[k] = replace(self.build(self.classes[k], bodies, rooms), step=step)
+        built, kept = self.build(self.classes[k], bodies, rooms), memory.rooms.get((k,), {})
+        marks = {}
+        for name, arranged in built.arranged.items():
+            if name in kept and len(kept[name]) == arranged.order.size:
+                marks[name] = kept[name]  # To be written when lists of particles are chosen.
+        few = sum(arranged.order.size for arranged in built.arranged.values()) <= BRIEF
+        settled = few and memory.builds % SELDOM != 0
+        memory.lists[k] = replace(built, step=step, marks=marks, settled=settled)
         memory.builds += 1
 
     def build(
@@ -160,10 +177,11 @@ class Nearby:
     ) -> Lists:
         """Lists with those of particles, within a radius [m] of where they are now."""
         places = {name: packed[name][RECORDS] for name in shared.systems}
-        short = {}
+        bounds, short = bounds_in(rooms), {}
+        bounds[[RADIUS, WANTED]] = radius, 1
         for (a, b), lists in found.near.items():
             room = rooms.setdefault((a, b), Room())
-            short[a, b] = particle_lists(lists, places[a], places[b], radius, a == b, room)
+            short[a, b] = particle_lists(lists, places[a], places[b], bounds, a == b, room)
         marks = {}
         for name, place in places.items():
             here = place[: found.arranged[name].order.size]
@@ -192,6 +210,34 @@ class Nearby:
                     continue
             self._push(k, bodies, pushes, memory)
 
+    def plans(
+        self, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting
+    ) -> list[Callable[[Relay, NDArray[Any]], None]] | None:
+        """What `push` would do until lists of clusters do not hold any more, to be appended to a
+        relay with the numbers, by round, that stop it then. None where that cannot be said
+        beforehand."""
+        if self.swarm is not None or memory.untidy or len(memory.lists) != len(self.classes):
+            return None
+        found: list[Callable[[Relay, NDArray[Any]], None]] = []
+        for k, (shared, lists) in enumerate(zip(self.classes, memory.lists, strict=True)):
+            plan = self._plans.get(k)
+            if plan is None or lists is None or not lists.settled or shared.every:
+                return None
+            if not plan.fits(lists, bodies, pushes):
+                return None
+            rooms = memory.rooms.setdefault((k,), {})
+            found.append(partial(plan.relay, shared, rooms))
+        return found
+
+    def relayed(self, memory: Lasting, stopped: bool) -> None:
+        """Take over what a relay has changed; if it has stopped, lists are known not to hold."""
+        for k, plan in self._plans.items():
+            lists = memory.lists[k]
+            if lists is plan.lists:
+                memory.lists[k] = plan.renewed()
+        if stopped:
+            self._plans.clear()
+
     def _push(
         self, k: int, bodies: dict[str, Body], pushes: dict[str, NDArray[Any]], memory: Lasting
     ) -> None:
@@ -201,7 +247,7 @@ class Nearby:
             if message := self._too_long(law, time):
                 raise SimulationError(message)
         found, places = self._current(k, bodies, memory, time)
-        sums: list[Call] = []
+        sums: list[Repeat] = []
         for law, targets, sources in shared.laws:
             sums += self._sums.pushing(law, targets, sources, time, found, places.packed, pushes)
         plan = Plan(found, places, sums, time, bodies, pushes)

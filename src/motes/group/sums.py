@@ -7,8 +7,9 @@ can be carried out again.
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -18,10 +19,11 @@ from numpy.typing import NDArray
 from motes.compile.pairs import Law
 from motes.compile.text import AXES
 from motes.group.lasting import Body, Class, Lists
-from motes.interact.arrange import FAR, Arranged, Box, pack, pack_images, packed_values
-from motes.jit import even_blocks
+from motes.group.renewal import Renewal
+from motes.interact.arrange import Arranged, Box, pack, pack_images, packed_values
+from motes.jit import BRIEF, even_blocks
 from motes.memory import allocate
-from motes.repeat import Repeats
+from motes.repeat import Relay, Repeat, Repeats
 
 RECORDS = "records"
 """Name of the places of all slots, x, y, z and a fourth number that nobody reads."""
@@ -35,16 +37,20 @@ Packed = dict[str, dict[str, Array]]
 """Columns by system and name, in the order of slots."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Places:
     """Calls that write where everybody is."""
 
     packed: Packed
     calls: Sequence[Call]
-    ways: Sequence[Array]
-    """For every system, squares of the longest ways (k, 2) since lists were built and shortened."""
+    ways: Array
+    """Squares of the longest ways (k, 2) since lists were built and shortened."""
     lasting: bool
     """Whether all that is read, besides where they are, is the same as long as the lists hold."""
+    read: Sequence[Any]
+    """The arrays that it is about."""
+    renewal: Renewal | None = None
+    """Calls that shorten lists anew."""
 
     def __call__(self) -> tuple[float, float]:
         """Write; returns how far one has moved since the lists were built, and shortened [m]."""
@@ -54,15 +60,15 @@ class Places:
         return math.sqrt(moved), math.sqrt(since)
 
 
-def _most(ways: Sequence[Array]) -> list[float]:
+def _most(ways: Array) -> list[float]:
     """The highest of each column, or not a number where there is one.
 
     Of a few rows in less time than NumPy takes to begin.
     """
-    if sum(map(len, ways)) > 64:
-        most: list[float] = np.concatenate(ways).max(axis=0).tolist()
+    if len(ways) > 64:
+        most: list[float] = ways.max(axis=0).tolist()
         return most
-    columns = zip(*(row for way in ways for row in way.tolist()), strict=True)
+    columns = zip(*ways.tolist(), strict=True)
     return [max(column) if sum(column) >= 0 else math.nan for column in columns]
 
 
@@ -70,7 +76,7 @@ class Plan:
     """An evaluation that can be carried out again while lists and arrays are the same."""
 
     def __init__(
-        self, lists: Lists, places: Places, sums: Sequence[Call], time: float,
+        self, lists: Lists, places: Places, sums: Sequence[Repeat], time: float,
         bodies: dict[str, Body], pushes: dict[str, Array],
     ) -> None:  # fmt: skip
         self.lists, self.places, self._sums, self.time = lists, places, sums, time
@@ -94,6 +100,31 @@ class Plan:
         for call in self._sums:
             call()
 
+    def relay(self, shared: Class, rooms: dict[Any, Any], relay: Relay, numbers: Array) -> None:
+        """Append the evaluation to a relay.
+
+        Lists of particles are chosen anew where they must be; where that cannot be, the relay stops
+        with the round's number (rounds, 1) before the sums.
+        """
+        for call in self.places.calls:
+            assert isinstance(call, Repeat)  # Else the plan would not be kept.
+            relay.add(call)
+        renewal = self.places.renewal
+        if renewal is None or renewal.short is not self.lists.short:
+            places = {name: columns[RECORDS] for name, columns in self.places.packed.items()}
+            renewal = Renewal(self.lists, places, self.places.ways, rooms, relay.stopped)
+            self.places.renewal = renewal
+        renewal.add(relay, shared, self.lists, self.time, numbers)
+        for call in self._sums:
+            relay.add(call)
+
+    def renewed(self) -> Lists:
+        """The lists as a relay has left them."""
+        renewal = self.places.renewal
+        if renewal is not None and renewal.held != self.lists.short_radius:
+            self.lists = replace(self.lists, short_radius=renewal.held)
+        return self.lists
+
 
 class Sums:
     """Makes the calls of evaluations."""
@@ -104,20 +135,41 @@ class Sums:
         self._rooms: dict[Any, tuple[Array, Array]] = {}
         self._columns: dict[str, tuple[Array, dict[str, Array]]] = {}
         self._calls = Repeats()
+        self._places: Places | None = None
 
     def places(self, shared: Class, found: Lists, bodies: dict[str, Body]) -> Places:
         """What writes what the laws of a class read of every system in the order of slots.
 
-        Places come as records (slots + 1, 4), and, as the columns of these, one by one.
+        Places come as records (slots + 1, 4), and, as the columns of these, one by one. What was
+        made last serves again while it is about the same arrays.
         """
+        names = list(shared.fields)
+        read: list[Any] = [shared, found.columns]
+        for name in names:
+            arranged = found.arranged[name]
+            records = self._space((name, "x"), (arranged.slots + 1, 4))
+            read += [arranged, records, found.marks.get(name), bodies[name].motion]
+        known = self._places
+        if known is None or not known.lasting or not all(map(operator.is_, known.read, read)):
+            known = self._places = self._new_places(shared, found, bodies, read)
+        return known
+
+    def _new_places(
+        self, shared: Class, found: Lists, bodies: dict[str, Body], read: Sequence[Any]
+    ) -> Places:
+        """The same, made anew."""
         packed: Packed = {}
         calls: list[Call] = []
-        ways: list[Array] = []
-        lasting = True
+        parts = {name: even_blocks(bodies[name].alive) or [(0, 0)] for name in shared.fields}
+        ways = self._space(("ways",), (sum(map(len, parts.values())), 2), np.float64)
+        lasting, begin = True, 0
         for name, fields in shared.fields.items():
             body, arranged = bodies[name], found.arranged[name]
             records = self._space((name, "x"), (arranged.slots + 1, 4))
-            calls += self._packing(body, arranged, records, found.marks.get(name), ways)
+            end = begin + len(parts[name])
+            mark = found.marks.get(name)
+            calls += self._packing(body, arranged, records, mark, ways[begin:end], parts[name])
+            begin = end
             columns = packed[name] = self._views(name, records)
             for field in fields:
                 kept, size = found.columns.get((name, field)), arranged.slots + 1
@@ -128,25 +180,24 @@ class Sums:
                     kept, lasting = self._space((name, field), (size,)), False
                     calls.append(partial(packed_values, arranged, body.column(field), kept))
                 columns[field] = kept
-        return Places(packed, calls, ways, lasting)
+        return Places(packed, calls, ways, lasting, read)
 
     def _packing(
-        self, body: Body, arranged: Arranged, records: Array, mark: Array | None, ways: list[Array]
-    ) -> list[Call]:
+        self, body: Body, arranged: Arranged, records: Array, mark: Array | None, ways: Array,
+        parts: Sequence[tuple[int, int]],
+    ) -> list[Repeat]:  # fmt: skip
         """Calls that write a system's places into records, and the longest ways."""
         n, images = arranged.order.size, arranged.ghost_of.size
-        parts = [(k, *part) for k, part in enumerate(even_blocks(n))]
-        moved = self._space((body.name, "moved"), (max(len(parts), 1), 2), np.float64)
-        moved.fill(0)
-        ways.append(moved)
+        numbered = [(k, *part) for k, part in enumerate(parts)]
         if mark is None:
             mark = NO_MARKS[self.real]
-        place = arranged.order, arranged.real.position, self._period, mark, records, moved
+        place = arranged.order, arranged.real.position, self._period, mark, records, ways
         image = records, arranged.ghost_of, arranged.image, arranged.shift, n
         return [
-            self._calls((body.name, "x"), pack, (body.motion, *place), parts),
-            self._calls((body.name, "images"), pack_images, image, even_blocks(images)),
-            partial(records[-1].fill, FAR),
+            self._calls((body.name, "x"), pack, (body.motion, *place), numbered, n <= BRIEF),
+            self._calls(
+                (body.name, "images"), pack_images, image, even_blocks(images), images <= BRIEF
+            ),
         ]
 
     def _views(self, name: str, records: Array) -> dict[str, Array]:
@@ -184,9 +235,9 @@ class Sums:
     def pushing(
         self, law: Law, targets: Iterable[str], sources: Sequence[str], time: float, found: Lists,
         packed: Packed, pushes: dict[str, Array],
-    ) -> list[Call]:  # fmt: skip
+    ) -> list[Repeat]:  # fmt: skip
         """Calls that add a law's accelerations (3, n) to pushes, with the last source's sums."""
-        calls: list[Call] = []
+        calls: list[Repeat] = []
         for target in targets:
             out = self._room_of_sums(law, law.summed, target, found)
             for k, source in enumerate(sources):

@@ -272,8 +272,10 @@ def pack(
     """Fill places (slots + 1, 4) from positions (3, rows): images near where they were arranged.
 
     Into `moved` go the squares of the longest ways that one has gone since it was arranged, and
-    since it was at its `mark` (n, 4).
+    since it was at its `mark` (n, 4). The last place is nobody's.
     """
+    if begin == 0:
+        out[out.shape[0] - 1] = FAR
     most = far = out.dtype.type(0)
     marked = mark.shape[0] > 0
     for i in range(np.uint64(begin), np.uint64(end)):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate, pairwise
 from operator import le
 from typing import Any, NamedTuple
 
@@ -22,6 +23,22 @@ from motes.interact.cells import Grid
 from motes.jit import STRICT, Calls, each, jit
 from motes.machine.shuffles import LANES, near_slots, taken_apart
 from motes.memory import afford, allocate
+from motes.repeat import Repeat
+
+RADIUS, WANTED = range(2)
+"""Places in the bounds of lists of particles: their radius [m], and whether they are wanted."""
+
+LONGER = 2 * LANES
+"""Entries by which the longest list may grow, until who reads lists needs more room."""
+
+CANDIDATES = 1024
+"""Candidates of a cluster that there is room for at first."""
+
+NEAR_CLUSTER, NEAR_PARTICLE, SPARE = 512, 96, 4096
+"""Entries that new lists have room for: of a cluster, of a particle, and of a part besides.
+
+They are those of a liquid and some more; room that is not written to is no memory yet.
+"""
 
 
 class Part(NamedTuple):
@@ -34,7 +51,7 @@ class Part(NamedTuple):
     entry: NDArray[np.int32]
     """Slots of neighbours; the slot after the last stands for nobody."""
     longest: int
-    """Length of the longest list."""
+    """What the longest list is not longer than."""
 
 
 class Clusters(NamedTuple):
@@ -53,24 +70,15 @@ class Room:
 
     entries: list[NDArray[np.int32]] = field(default_factory=list)
     work: list[Any] = field(default_factory=list)
-    """What a kernel was called with for each part, while that may be so again."""
-    calls: Calls | None = None
-    """The same as calls of the kernel."""
+    """What a kernel is called with for each part."""
+    state: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 3), np.int64))
+    """How far the kernel came in each part."""
+    repeat: Repeat | None = None
+    """The calls of the kernel, while they may be so again."""
     chosen: Calls | None = None
     """Lists of particles as calls of who reads them."""
     lists: Sequence[Clusters] | None = None
     """The lists of clusters that they were chosen from."""
-
-
-class _Candidates(NamedTuple):
-    """Candidates of one cluster."""
-
-    position: NDArray[Any]
-    slot: NDArray[np.int32]
-
-
-def _candidates(points: int, real: Any) -> _Candidates:
-    return _Candidates(np.zeros((3, points), real), np.empty(points, np.int32))
 
 
 @jit(inline=True, flags=STRICT)
@@ -162,13 +170,13 @@ def _to_box(low: Any, high: Any, x: Any) -> None:
 
 @jit(flags=STRICT)
 def _seek(
-    position: Any, cells: Any, ghosts: Any, grid: Any, inner: Any, radius: Any, state: Any,
-    part: Any, cluster: Any, room: Any, first: Any, entry: Any,
+    position: Any, cells: Any, ghosts: Any, grid: Any, inner: Any, state: Any, radius: Any,
+    part: Any, cluster: Any, slots: Any, place: Any, first: Any, entry: Any,
 ) -> None:  # fmt: skip
     """Append lists of a part's clusters; `state` holds the first without, what that needs, and the
     length of the longest list so far."""
     real = position.dtype.type
-    wide = radius * (1 + 2.0**-18)
+    wide = radius[0] * (1 + 2.0**-18)
     limit, nought = real(wide) * real(wide), real(0)
     n = cells.key.size
     nobody, no_one = np.int32(n + ghosts.key.size), np.int32(-1)
@@ -178,8 +186,8 @@ def _seek(
     gx, gy, gz = ghosts.position[0], ghosts.position[1], ghosts.position[2]
     cell_key, cell_table, cell_shift = cells.key, cells.first, cells.shift
     ghost_key, ghost_table, ghost_shift = ghosts.key, ghosts.first, ghosts.shift
-    rx, ry, rz = room.position[0], room.position[1], room.position[2]
-    slots, longest = room.slot, state[part, 2]
+    rx, ry, rz = place[0], place[1], place[2]
+    longest = state[part, 2]
     for c in range(state[part, 0], cluster.size - 1):
         a, b = cluster[c], cluster[c + 1]
         x0 = x1 = xs[a]
@@ -226,11 +234,15 @@ def _seek(
 
 @jit(flags=STRICT)
 def _choose(
-    own: Any, others: Any, limit: Any, itself: Any, state: Any, part: Any, cluster: Any,
+    own: Any, others: Any, itself: Any, state: Any, bounds: Any, part: Any, cluster: Any,
     near_first: Any, near: Any, place: Any, first: Any, entry: Any,
 ) -> None:  # fmt: skip
-    """Append lists of the particles of a part's clusters, of what is within a square of a distance;
+    """Append lists of the particles of a part's clusters, of what is within a radius, if wanted;
     `state` as for `_seek`."""
+    if not bounds[WANTED] > 0:
+        return
+    radius = own.dtype.type(bounds[RADIUS])
+    limit = radius * radius
     nobody, longest = np.int32(others.shape[0] - 1), state[part, 2]
     for c in range(state[part, 0], cluster.size - 1):
         a, b = cluster[c], cluster[c + 1]
@@ -263,70 +275,84 @@ def cluster_lists(
     Entries go into `room` where that is large enough.
     """
     real = targets.real.position.dtype.type
-    head = (
-        targets.real.position, sources.real, sources.ghosts, cut, sources.inner, float(radius)
-    )  # fmt: skip
-    room.work, room.calls = [], None
-    for k, cluster in enumerate(targets.clusters):
-        first, entry = np.zeros(cluster.size, np.int64), _again(room, k, 400 * cluster.size)
-        room.work.append((k, cluster, _candidates(1024, real), first, entry))
-    longest, _ = _carried_out(_seek, head, room)
-    found = [Clusters(one[1], one[3], one[4], longest[one[0]]) for one in room.work]
-    room.work, room.calls = [], None
+    head = targets.real.position, sources.real, sources.ghosts, cut, sources.inner
+    room.work, room.repeat = [], None
+    entries = _entries(room, [NEAR_CLUSTER * cluster.size for cluster in targets.clusters])
+    for k, (cluster, entry) in enumerate(zip(targets.clusters, entries, strict=True)):
+        first = np.zeros(cluster.size, np.int64)
+        slots, place = np.empty(CANDIDATES, np.int32), np.empty((3, CANDIDATES), real)
+        room.work.append((k, cluster, slots, place, first, entry))
+    longest, _ = _carried_out(_seek, head, np.array([float(radius)]), room)
+    found = [Clusters(one[1], one[-2], one[-1], longest[one[0]]) for one in room.work]
+    room.work, room.repeat = [], None
     return found
 
 
 def particle_lists(
-    lists: Sequence[Clusters], own: NDArray[Any], others: NDArray[Any], radius: float,
-    itself: bool, room: Room,
+    lists: Sequence[Clusters], own: NDArray[Any], others: NDArray[Any],
+    bounds: NDArray[np.float64], itself: bool, room: Room,
 ) -> Calls:  # fmt: skip
-    """Each particle's neighbours within `radius` [m] of places (slots + 1, 4), without itself.
+    """Each particle's neighbours within a radius [m] of places (slots + 1, 4), without itself.
 
-    `itself` says that particles are among the others; entries go into `room` as before. Returns
-    the lists, `Part`s, as last arguments of calls: those of before where they are in the same
-    memory.
+    `bounds` holds the radius and that it is wanted, `itself` says that particles are among the
+    others; entries go into `room` as before. Returns the lists, `Part`s, as last arguments of
+    calls: those of before where they are in the same memory.
     """
     real = own.dtype.type
     if room.lists is not lists:
-        room.lists, room.work, room.calls, room.chosen = lists, [], None, None
+        room.lists, room.work, room.repeat, room.chosen = lists, [], None, None
+        counts = [int(cluster[-1] - cluster[0]) for cluster, *_ in lists]
+        entries = _entries(room, [NEAR_PARTICLE * many for many in counts])
         for k, (cluster, near_first, near, longest) in enumerate(lists):
-            many = int(cluster[-1] - cluster[0])
-            first, entry = np.zeros(many + 1, np.int64), _again(room, k, 96 * many)
+            first, entry = np.zeros(counts[k] + 1, np.int64), entries[k]
             place = np.empty((3, longest), real)
             room.work.append((k, cluster, near_first, near, place, first, entry))
-    most, grown = _carried_out(_choose, (own, others, real(radius) ** 2, itself), room)
+    most, grown = _carried_out(_choose, (own, others, itself), bounds, room)
     if room.chosen is not None and not grown:
         known = [int(part[-1]) for part in room.chosen.tails]
         if all(map(le, most, known)):
             return room.chosen
         most = list(map(max, most, known))
-    room.chosen = Calls([Part(int(one[1][0]), one[5], one[6], most[one[0]]) for one in room.work])
+    most = [length + LONGER for length in most]
+    parts = [Part(int(one[1][0]), one[5], one[6], most[one[0]]) for one in room.work]
+    room.chosen = Calls(parts, alike=True)
     return room.chosen
 
 
-def _again(room: Room, k: int, likely: int) -> NDArray[np.int32]:
-    """Memory for a part's entries: that of before, if there is any."""
-    return room.entries[k] if k < len(room.entries) else np.empty(likely + 4096, np.int32)
+def _entries(room: Room, likely: Sequence[int]) -> list[NDArray[np.int32]]:
+    """Memory for the entries of all parts: that of before, if there is any.
+
+    New memory is one array for all of them: the system gives large arrays in large pages.
+    """
+    if len(room.entries) != len(likely):
+        ends = [0, *accumulate(size + SPARE for size in likely)]
+        whole = allocate((ends[-1],), np.int32, "a list of neighbours")
+        room.entries = [whole[begin:end] for begin, end in pairwise(ends)]
+    return room.entries
 
 
-def _carried_out(kernel: Any, head: Any, room: Room) -> tuple[list[int], bool]:
+def _carried_out(kernel: Any, head: Any, bounds: Any, room: Room) -> tuple[list[int], bool]:
     """Let a kernel fill the lists of all parts, with more room for those that need it.
 
     Returns the length of the longest list of every part, at least one vector, and whether any
     needed more room.
     """
     work = room.work
-    state = np.zeros((len(work), 3), np.int64)
-    if room.calls is None:
-        room.calls = Calls(list(work))
-    each(kernel, (*head, state), room.calls)
+    if len(room.state) != len(work):
+        room.state = np.empty((len(work), 3), np.int64)
+    state = room.state
+    state.fill(0)
+    head = *head, state, bounds
+    if room.repeat is None or not room.repeat.fits(kernel, head, room.repeat.tails):
+        room.repeat = Repeat(kernel, head, Calls(list(work), alike=True))
+    room.repeat()
     grown = False
     while waiting := [one for one in work if state[one[0], 0] < one[1].size - 1]:
-        grown, room.calls = True, None
+        grown, room.repeat = True, None
         for one in waiting:
             work[one[0]] = _wider(one, *state[one[0], :2].tolist())
             afford(sum(part[-1].nbytes for part in work), "a list of neighbours")
-        each(kernel, (*head, state), [work[one[0]] for one in waiting])
+        each(kernel, head, [work[one[0]] for one in waiting])
     room.entries = [one[-1] for one in work]
     return [max(LANES, longest) for longest in state[:, 2].tolist()], grown
 
@@ -334,9 +360,10 @@ def _carried_out(kernel: Any, head: Any, room: Room) -> tuple[list[int], bool]:
 def _wider(one: Any, begin: int, points: int) -> Any:
     """A part's work with room to go on from a cluster that has so many candidates."""
     cluster = one[1]
-    places, first, entry = one[-3:]
-    if isinstance(places, _Candidates) and points > places.slot.size:
-        places = _candidates(2 * points, places.position.dtype)
+    place, first, entry = one[-3:]
+    if points > place.shape[1]:  # Candidates, which also have slots.
+        place = np.empty((3, 2 * points), place.dtype)
+        one = *one[:2], np.empty(2 * points, np.int32), *one[3:]
     held, most = LANES * int(first.max()), CLUSTER * (points + LANES)
     if held + most > entry.size:
         likely = int(1.1 * held * cluster.size / max(begin, 1)) if 8 * begin > cluster.size else 0
@@ -344,4 +371,4 @@ def _wider(one: Any, begin: int, points: int) -> Any:
         larger = allocate((size,), np.int32, "a list of neighbours")
         larger[:held] = entry[:held]
         entry = larger
-    return (*one[:-3], places, first, entry)
+    return (*one[:-3], place, first, entry)

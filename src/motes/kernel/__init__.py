@@ -27,6 +27,7 @@ __all__ = [
     "Elementary",
     "atan2",
     "cos",
+    "damped_time",
     "exp",
     "floor",
     "int32",
@@ -115,12 +116,13 @@ tanh = _both("tanh", np.tanh)
 atan2 = _both("atan2", np.arctan2)
 pow = _both("pow", np.power)
 phi1 = _both("phi1", _phi1)
+damped_time = _both("damped_time", lambda rate, h: h * _phi1(rate * h))
 sqrt = _both("sqrt", np.sqrt)
 floor = _both("floor", np.floor)
 real = _both("real", np.float64)
 
 ELEMENTARY = {
     function.name: function
-    for function in (exp, log, sin, cos, tanh, atan2, pow, phi1, sqrt, floor, real)
+    for function in (exp, log, sin, cos, tanh, atan2, pow, phi1, damped_time, sqrt, floor, real)
 }
 """The elementary functions by name."""

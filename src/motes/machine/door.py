@@ -61,6 +61,11 @@ def spread(argument: Any, key: list[Any], numbers: list[Any]) -> None:
         numbers.append(argument)
 
 
+def numbers_of(arguments: Sequence[Any]) -> list[Any]:
+    """What `spread` gives as numbers of arguments that are arrays and plain numbers."""
+    return [id(one) if type(one) is np.ndarray else one for one in arguments]
+
+
 SMALL = 1 << 16
 """Bytes of arrays below which a tuple of them is remembered."""
 
@@ -132,6 +137,7 @@ class Door:
     """Machine code for one list of argument types."""
 
     def __init__(self, addresses: tuple[int, int], kinds: Sequence[Type], result: Type) -> None:
+        self.address = addresses[0]
         self._function = _PROTOTYPE(addresses[0])
         self._each = _EACH(addresses[1]) if addresses[1] else None
         self._letters = "".join(map(letters, kinds))
@@ -178,30 +184,51 @@ class Door:
         run, whole, count, stride = self._each, b"".join(packs), len(packs), len(packs[0])
         return lambda counter, most: run(whole, stride, counter, count, most)
 
-    def again(
+    def packs(
         self, head: Sequence[Any], middle: int, tails: Sequence[Sequence[Any]]
-    ) -> Callable[..., None] | None:
-        """Calls with the same first and last numbers, as one function of those in the middle.
+    ) -> Callable[..., bytes] | None:
+        """Arguments of calls with the same first and last numbers, packed one call after another,
+        as a function of the numbers in the middle.
 
         None where calls give results.
         """
-        run = self._each
-        if self._size or run is None:
+        if self._size or self._each is None:
             return None
         begin, end = len(head), len(head) + middle
         first = struct.pack("=" + self._letters[:begin], *head)
         pack = struct.Struct("=" + self._letters[begin:end]).pack
         lasts = [struct.pack("=" + self._letters[end:], *tail) for tail in tails]
-        if len(tails) == 1:
-            function, last = self._function, lasts[0]
-            return lambda *numbers: function(first + pack(*numbers) + last, None)
-        count, stride = len(tails), 8 * len(self._letters)
         if not middle:
             same = b"".join([first + last for last in lasts])
-            return lambda: share_out(lambda c, most: run(same, stride, c, count, most), count)
+            return lambda: same
+        if len(lasts) == 1:
+            last = lasts[0]
+            return lambda *numbers: first + pack(*numbers) + last
 
-        def calls(*numbers: float) -> None:
-            whole = b"".join([first + pack(*numbers) + last for last in lasts])
+        def packed(*numbers: float) -> bytes:
+            begun = first + pack(*numbers)
+            return b"".join([begun + last for last in lasts])
+
+        return packed
+
+    @property
+    def stride(self) -> int:
+        """Bytes of one call's arguments."""
+        return 8 * len(self._letters)
+
+    def calls(self, packs: Callable[..., bytes], count: int, alone: bool) -> Callable[..., None]:
+        """So many packed calls as one function, on the threads or on this one `alone`."""
+        function, run, stride = self._function, self._each, self.stride
+        assert run is not None
+        if count == 1:
+            return lambda *numbers: function(packs(*numbers), None)
+
+        def here(*numbers: float) -> None:
+            counter = ctypes.c_int64(0)
+            run(packs(*numbers), stride, ctypes.addressof(counter), count, count)
+
+        def shared(*numbers: float) -> None:
+            whole = packs(*numbers)
             share_out(lambda counter, most: run(whole, stride, counter, count, most), count)
 
-        return calls
+        return here if alone else shared
