@@ -15,7 +15,7 @@ from motes.interact.gravity.tree import END, RADIUS, START, Tree
 LEAVES = 16
 """Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
-LEAVES_OF_A_CLASS = 12
+LEAVES_OF_A_CLASS = 8
 """Target leaves out of each further class, which has twice as many as the one before."""
 
 DEVIATIONS = 2.5
