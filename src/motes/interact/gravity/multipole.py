@@ -61,7 +61,7 @@ STRICTER, STRICTEST, LOW_ORDER = 6.0, 100.0, 5
 """How much less the walk that the sample is compared with may neglect, and how much below an order:
 there errors fall slowly, as many are alike."""
 
-HIGHEST = {True: 12, False: 8}
+HIGHEST = {True: 11, False: 8}
 """Highest order of harmonic expansions and of others: more would not be faster."""
 
 

@@ -48,9 +48,6 @@ from motes.machine.traced import (
     zeros,
 )
 
-STRAIGHT = 200
-"""Numbers in the longest expansion whose operations are straight-line code."""
-
 Operation = Callable[..., None]
 
 
@@ -67,10 +64,12 @@ class Translations(NamedTuple):
     those of its children; place[:3] is the parent's center from the child's and place[4] the
     child's radius, in the parent's radius; place[3] is 1, and 0 in unused lanes."""
     moments_to_local: Operation
-    """(balls, chosen, own, table, e2, local): add to `local` (basis, LANES) the terms, in a cell
-    with the ball `own`, of source cells whose balls and moments are rows `chosen` of two tables; e2
-    is the squared softening. Moments of the first degree are taken for 0, as they are around
-    centers of mass."""
+    """(balls, chosen, own, table, e2, places, room, local): add to `local` (basis, LANES) the
+    terms, in a cell with the ball `own`, of source cells whose balls and moments are rows `chosen`
+    of two tables; e2 is the squared softening. Moments of the first degree are taken for 0, as they
+    are around centers of mass. `room` (ROOM, LANES) is written to: derivatives where `row_of` says,
+    and scaled moments, whose products are summed in loops; `places` are those of the harmonic kind
+    or not."""
     lanes_to_local: Operation
     """(local, terms): add the lane sums of `local` (basis, LANES) to terms (basis,)."""
     local_to_local: Operation
