@@ -48,6 +48,9 @@ from motes.machine.traced import (
     zeros,
 )
 
+STRAIGHT = 6
+"""Highest order at which products of moments and derivatives stay in registers, without loops."""
+
 Operation = Callable[..., None]
 
 
@@ -116,14 +119,25 @@ def translations(order: int, harmonic: bool) -> Translations:
         x, y, z = (own[k] - ball[k] + (own[3 + k] - ball[3 + k]) for k in range(3))
         inverse = inverse_root(x * x + y * y + z * z + e2)
         slopes = derivatives(order, harmonic, (x * inverse, y * inverse, z * inverse), ones(x))
-        for t, value in slopes.items():
-            room[row_of(t, harmonic)] = value
-        forget(room)
+        others = without_first(basis)
+        if order > STRAIGHT:
+            for t, value in slopes.items():
+                room[row_of(t, harmonic)] = value
+            forget(room)
         power = powers(order, ball[6] * inverse, inverse)
         given = dict(zip(basis, gathered(table, chosen, len(basis)), strict=True))
-        others = without_first(basis)
+        moments = {b: given[b] * power[sum(b)] for b in others}
+        if order <= STRAIGHT:
+            power = powers(order, own[6] * inverse, ones(x))
+            pairs = [
+                [(moments[b], slopes[plus(a, b)]) for b in others if sum(a) + sum(b) <= order]
+                for a in basis
+            ]
+            for n, value in enumerate(products(pairs)):
+                local[n] = local[n] + value * power[sum(basis[n])]
+            return
         for k, b in enumerate(others):
-            room[MOMENTS + k] = given[b] * power[sum(b)]
+            room[MOMENTS + k] = moments[b]
         forget(room)
         power = powers(order, own[6] * inverse, ones(x))
         for chunk, steps in stairs(kind, held(x)):
