@@ -52,8 +52,9 @@ class Glide:
             isinstance(group.method, Splitting)
             and bool(nearby.classes)
             and not (any(more) or nearby.depends_on_velocity)
+            and all(s.system.surfaces is None for s in group.steppers.values())
         )
-        """Whether forces within reach are all that happens between particles."""
+        """Whether forces within reach are all that happens to particles besides their motion."""
 
     def __call__(
         self, systems: dict[str, Particles], times: Sequence[float], memory: Lasting,
