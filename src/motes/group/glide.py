@@ -81,8 +81,8 @@ class Glide:
         if relay is None:
             return 0
         self._stopped.fill(0)
+        memory.push = None  # Whoever interrupts it finds no push of other places.
         relay.run()
-        memory.push = None
         self.group.nearby.relayed(memory, bool(self._stopped[0]))
         if not self._stopped[0]:
             memory.steps += steps
