@@ -22,6 +22,9 @@ FOLDER = Path(__file__).resolve().parent / "pictures"
 EVERY = 4
 """Frames from one measured instant to the next."""
 
+LATTICE = 0.6
+"""Local order above which an atom counts as part of the lattice."""
+
 
 def melting(left: Any, right: Any) -> None:
     """Temperature and potential energy of a melt; pairs at a distance before and after."""
@@ -46,6 +49,27 @@ def crystal(sim: motes.Simulation) -> Any:
     """Places after a few steps, when the lattice is whole and its atoms tremble."""
     sim.run(steps=10)
     return sim["atoms"].position
+
+
+def lj_melting(left: Any, right: Any) -> None:
+    """Temperature and share of atoms in the lattice; their order at distances from the middle."""
+    sim, rows = motes.Simulation(motes.load("lj_melting")), []
+    for number, _ in enumerate(sim.frames()):
+        x, v = sim["atoms"].position.astype(float), sim["atoms"].velocity.astype(float)
+        if number % (2 * EVERY) == 0:
+            order = motes.matter.local_order(x)
+            rows.append((sim.time, (v**2).sum(axis=1).mean() / 3, np.mean(order > LATTICE)))
+        if number in (0, 120, 168, 239):
+            away = np.linalg.norm(x - x.mean(axis=0), axis=1)
+            shell = np.digitize(away, np.arange(1, 16))
+            order = motes.matter.local_order(x)
+            means = [order[shell == k].mean() for k in range(15)]
+            right.plot(np.arange(15) + 0.5, means, label=f"t = {sim.time:.1f}")
+    time, temperature, ordered = np.transpose(rows)
+    left.plot(time, temperature, label="temperature")
+    left.plot(time, ordered, label=f"share of atoms of an order above {LATTICE}")
+    left.set(xlabel="time", ylabel="reduced units")
+    right.set(xlabel="distance from the middle / sigma", ylabel="mean local order")
 
 
 def splash(left: Any, right: Any) -> None:
@@ -108,6 +132,7 @@ def particle_life(left: Any, right: Any) -> None:
 
 PLOTS: dict[str, Callable[[Any, Any], None]] = {
     "melting": melting,
+    "lj_melting": lj_melting,
     "splash": splash,
     "granular": granular,
     "particle_life": particle_life,

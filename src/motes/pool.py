@@ -2,6 +2,9 @@
 
 A thread waits for work in a lock, which wakes it in half the time that a queue takes: a step of ten
 thousand particles is a millisecond, and has several such calls.
+
+An interrupt (Ctrl-C) may come between any two lines here that the main thread runs. So all that it
+does can be done twice: who owns a piece of work is settled once and can be asked again.
 """
 
 from __future__ import annotations
@@ -11,78 +14,92 @@ import os
 import threading
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from time import sleep
 from typing import Any
 
 _threads = 0
-_idle: list[_Helper] = []
-_helpers = 0
+_helpers: list[_Helper] = []
 
 
-class _Helper:
-    """A thread that does one piece of work after another."""
+class _Job:
+    """A piece of work that a helper is asked for, and that is done at most once."""
 
-    def __init__(self) -> None:
-        self._begun, self._done = threading.Lock(), threading.Lock()
-        self._begun.acquire()
+    def __init__(self, work: Callable[[], None]) -> None:
+        self._work: Callable[[], None] | None = work
+        self.over = False
+        self._owner: dict[int, object] = {}
+        self._done = threading.Lock()
         self._done.acquire()
-        self._work: Callable[[], None] | None = None
         self._fault: BaseException | None = None
-        threading.Thread(target=self._serve, name="motes", daemon=True).start()
 
-    def begin(self, work: Callable[[], None]) -> None:
-        """Let the thread work."""
-        self._work = work
-        self._begun.release()
+    def _belongs(self, to: object) -> bool:
+        """Whether it belongs to who asks: it is the first one's who does, for good."""
+        return self._owner.setdefault(0, to) is to
+
+    def run(self) -> None:
+        """Do the work in a helper, unless somebody has begun or taken it back."""
+        if self._work is None or not self._belongs(object()):
+            return
+        try:
+            self._work()
+        except BaseException as fault:
+            self._fault = fault
+        self._work = None  # A helper keeps its last job, which shall not keep arrays.
+        self.over = True
+        self._done.release()
 
     def end(self) -> BaseException | None:
-        """Wait until the work is done; returns what it raised, and again None after that.
+        """Wait until the work is done, and give what it raised.
 
         Work that has not begun is taken back: there is nothing left to do.
         """
-        if self._work is None:
-            return None
-        if not self._begun.acquire(blocking=False):
+        if self._belongs(self):
+            self._work, self.over = None, True
+        elif not self.over:
             self._done.acquire()
-        fault, self._work, self._fault = self._fault, None, None
-        _idle.append(self)
-        return fault
+        return self._fault
+
+
+class _Helper:
+    """A thread that does one job after another."""
+
+    def __init__(self) -> None:
+        self._wake = threading.Lock()
+        self._wake.acquire()
+        self._job: _Job | None = None
+        threading.Thread(target=self._serve, name="motes", daemon=True).start()
+
+    @property
+    def free(self) -> bool:
+        """Whether it does nothing, as far as one can know: two may ask at once, and then one of
+        them does its job alone."""
+        return self._job is None or self._job.over
+
+    def begin(self, job: _Job) -> None:
+        """Let the thread do a job."""
+        self._job = job
+        with suppress(RuntimeError):  # It is awake already.
+            self._wake.release()
 
     def _serve(self) -> None:
         while True:
-            self._begun.acquire()
-            try:
-                if self._work is not None:
-                    self._work()
-            except BaseException as fault:
-                self._fault = fault
-            self._done.release()
+            self._wake.acquire()
+            if self._job is not None:
+                self._job.run()
 
 
 def _hired(count: int) -> list[_Helper]:
-    """At most so many helpers: those that are idle, and new ones while there are few."""
-    global _helpers
-    found: list[_Helper] = []
-    while len(found) < count:
-        try:
-            found.append(_idle.pop())
-        except IndexError:
-            if _helpers >= threads():
-                break
-            _helpers += 1
-            found.append(_Helper())
-    return found
+    """At most so many helpers: those that are free, and new ones while there are few."""
+    found = [helper for helper in _helpers if helper.free]
+    while len(found) < count and len(_helpers) < threads():
+        found.append(_Helper())
+        _helpers.append(found[-1])
+    return found[:count]
 
 
-def _forget() -> None:
-    """A process that was forked has no threads but its own."""
-    global _helpers
-    _idle.clear()
-    _helpers = 0
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forget)
+if hasattr(os, "register_at_fork"):  # A process that was forked has no threads but its own.
+    os.register_at_fork(after_in_child=_helpers.clear)
 
 
 def threads(count: int | None = None) -> int:
@@ -128,20 +145,39 @@ def share(task: Callable[[int], Any], count: int) -> None:
 
 def _together(work: Callable[[], None], count: int, drop: Callable[[], Any]) -> None:
     """Work on all threads that so many tasks are enough for; `drop` takes away what is left."""
-    helpers = _hired(min(threads(), count) - 1) if count > 1 else []
+
+    def helped() -> None:
+        try:
+            work()
+        except BaseException:
+            drop()
+            raise
+
+    jobs: list[_Job] = []
     try:
-        for helper in helpers:
-            helper.begin(work)
+        for helper in _hired(min(threads(), count) - 1) if count > 1 else []:
+            jobs.append(_Job(helped))
+            helper.begin(jobs[-1])
         work()
-        faults = [helper.end() for helper in helpers]
+        faults = [job.end() for job in jobs]
     except BaseException:
         drop()
-        for helper in helpers:
-            helper.end()
+        _await(jobs)
         raise
     for fault in faults:
         if fault is not None:
             raise fault
+
+
+def _await(jobs: list[_Job]) -> None:
+    """Wait for what is running, which uses arrays of the caller's: also when interrupted again."""
+    while True:
+        try:
+            for job in jobs:
+                job.end()
+            return
+        except KeyboardInterrupt:
+            continue
 
 
 AT_ONCE = 16

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any
 
@@ -74,6 +75,7 @@ class Simulation:
             self._state.systems[system.name] = Particles(
                 system.name, real, moves, widths, compiled.motion.remembers
             )
+        self._torn = False
         self.work = 0
         """Particle-steps taken so far."""
         self._run(self._lead_in, None)
@@ -262,12 +264,28 @@ class Simulation:
     def _run(self, steps: int, progress: Callable[[Simulation], None] | None) -> None:
         last = self.steps + steps
         while self.steps < last:
-            if progress is None and self._glides(last - self.steps):
-                continue
-            begin, end = self._step_begin(self._state), self._step_begin(self._state, 1)
-            self._advance(self._state, Interval(begin, end))
+            with self._whole():
+                if progress is None and self._glides(last - self.steps):
+                    continue
+                begin, end = self._step_begin(self._state), self._step_begin(self._state, 1)
+                self._advance(self._state, Interval(begin, end))
             if progress is not None:
                 progress(self)
+
+    @contextmanager
+    def _whole(self) -> Iterator[None]:
+        """A step, or several, after which there is no next one should it be broken off."""
+        self._refuse_torn()
+        self._torn = True
+        yield
+        self._torn = False
+
+    def _refuse_torn(self) -> None:
+        if self._torn:
+            raise SimulationError(
+                f"a step after t = {self.time:.6g} s was broken off, and its particles are between "
+                "two states. Make the Simulation anew."
+            )
 
     def _glides(self, steps: int) -> bool:
         """Take several steps at once, at most so many, if all particles only move in them."""
@@ -332,6 +350,7 @@ class Simulation:
 
     def frame(self, time: float | None = None, index: int = 0) -> Frame:
         """What is to be seen at a time [s], by default now; the simulation stays where it is."""
+        self._refuse_torn()
         state, at = self._state, self.time
         if time is not None:
             ahead = time - self.time

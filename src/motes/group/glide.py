@@ -52,8 +52,9 @@ class Glide:
             isinstance(group.method, Splitting)
             and bool(nearby.classes)
             and not (any(more) or nearby.depends_on_velocity)
+            and all(s.system.surfaces is None for s in group.steppers.values())
         )
-        """Whether forces within reach are all that happens between particles."""
+        """Whether forces within reach are all that happens to particles besides their motion."""
 
     def __call__(
         self, systems: dict[str, Particles], times: Sequence[float], memory: Lasting,
@@ -80,8 +81,8 @@ class Glide:
         if relay is None:
             return 0
         self._stopped.fill(0)
+        memory.push = None  # Whoever interrupts it finds no push of other places.
         relay.run()
-        memory.push = None
         self.group.nearby.relayed(memory, bool(self._stopped[0]))
         if not self._stopped[0]:
             memory.steps += steps

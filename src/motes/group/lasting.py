@@ -139,6 +139,7 @@ class Lasting:
 
     def arrays(self) -> Iterator[NDArray[Any]]:
         """Everything that can change the next bit."""
+        yield np.array([self.builds])
         for part in self.lists:
             for arranged in part.arranged.values() if part else ():
                 yield from (arranged.order, arranged.real.position)
