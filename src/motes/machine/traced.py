@@ -1,8 +1,8 @@
 """Straight-line machine code from a formula in Python.
 
 A formula reads and writes arrays at places that Python knows, in loops over lists of terms. Traced,
-it runs once, with registers for numbers, and what it did becomes the code of one operation without
-loops. Called on NumPy arrays, it does the same slowly.
+it runs once, with registers for numbers, and what it did becomes the code of one operation, without
+loops but those that it asks for with `repeated`. Called on NumPy arrays, it does the same slowly.
 """
 
 from __future__ import annotations
