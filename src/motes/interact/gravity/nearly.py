@@ -79,12 +79,16 @@ def _drop(key: Any, order: Any, lost_key: Any, lost_order: Any) -> Any:
         if kept > 0:
             before = key[kept - 1]
             back = 1 if k < before or (k == before and o < order[kept - 1]) else 0
-        if back == 1 and stubborn == STUBBORN and kept > 1:
+        if back == 1 and stubborn == STUBBORN:
             # So many that are less than the last: it is what is out of order.
-            a, b = key[kept - 2], order[kept - 2]
-            if a < k or (a == k and b < o):
-                lost_key[lost], lost_order[lost] = key[kept - 1], order[kept - 1]
-                lost, kept, back = lost + 1, kept - 1, 0
+            kept -= 1
+            lost_key[lost], lost_order[lost] = key[kept], order[kept]
+            lost += 1
+            if kept > 0:
+                before = key[kept - 1]
+                back = 1 if k < before or (k == before and o < order[kept - 1]) else 0
+            else:
+                back = 0
         if back == 1:
             lost_key[lost], lost_order[lost] = k, o
             lost, stubborn = lost + 1, min(stubborn + 1, STUBBORN)
