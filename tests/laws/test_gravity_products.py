@@ -2,11 +2,13 @@
 
 from collections import Counter
 
+import numpy as np
 import pytest
 
 from motes.interact.gravity.expansions import (
     MOMENTS,
     ROOM,
+    derivatives,
     indices,
     places,
     plus,
@@ -15,6 +17,8 @@ from motes.interact.gravity.expansions import (
     terms,
     without_first,
 )
+from motes.interact.gravity.lanes import LANES
+from motes.interact.gravity.translations import padded, translations
 
 KINDS = [(order, True) for order in range(2, 13)] + [(order, False) for order in range(2, 9)]
 
@@ -48,3 +52,27 @@ def test_a_derivative_has_the_row_that_a_product_looks_for(order, harmonic):
     for a in kind.basis:
         for b in others:
             assert row_of(plus(a, b), harmonic) == row_of(a, harmonic) + row_of(b, harmonic)
+
+
+@pytest.mark.parametrize(("order", "harmonic"), [(2, True), (5, True), (9, True), (5, False)])
+def test_local_terms_are_the_sums_of_moments_times_derivatives(order, harmonic):
+    """In plain Python, with every product written out."""
+    rng = np.random.default_rng(3)
+    basis = terms(order, harmonic).basis
+    balls, own = rng.random((LANES, 8)), rng.random(8)
+    own[:3] += 3.0
+    table = rng.random((LANES, padded(len(basis))))
+    room, local = np.zeros((ROOM, LANES)), np.zeros((len(basis), LANES))
+    rows = np.array(places(harmonic), np.int32)
+    operation = translations(order, harmonic).moments_to_local
+    operation(balls, np.arange(LANES), own, table, 0.1, rows, room, local)
+    x, y, z = (own[k] + own[k + 3] - balls[:, k] - balls[:, k + 3] for k in range(3))
+    r = np.sqrt(x * x + y * y + z * z + 0.1)
+    slopes = derivatives(order, harmonic, (x / r, y / r, z / r), np.ones(LANES))
+    for n, a in enumerate(basis):
+        exact = sum(
+            table[:, k] * (balls[:, 6] / r) ** sum(b) / r * slopes[plus(a, b)]
+            for k, b in enumerate(basis)
+            if sum(b) != 1 and sum(a) + sum(b) <= order
+        ) * (own[6] / r) ** sum(a)
+        np.testing.assert_allclose(local[n], exact, rtol=1e-11, atol=1e-12)
