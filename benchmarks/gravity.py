@@ -22,9 +22,13 @@ from _report import Report, arguments, best, machine
 
 import motes.jit
 from motes import gravity
+from motes.interact.gravity.lanes import LANES
 from motes.interact.gravity.pairs import attraction
 
 SAMPLE = 300
+
+WIDEST = 16
+"""Numbers in single precision in the widest vectors there are."""
 
 Accelerations = Callable[[], np.ndarray]
 
@@ -75,6 +79,12 @@ def direct(report: Report, n: int) -> None:
     motes.jit.threads(every)
     report.figures["its inner loop in the cache"] = (inner_loop(), "G pairs/s")
     report.ratio("direct, single, 1 thread", "its inner loop in the cache")
+    report.figures["numbers in a vector, single"] = (LANES, "")
+    if LANES < WIDEST:
+        report.notes.append(
+            f"This processor's vectors hold {LANES} numbers in single precision; one with AVX-512 "
+            f"sums {WIDEST} pairs in as many instructions, which cannot be measured here."
+        )
 
 
 def multipole(report: Report, sizes: list[int]) -> None:

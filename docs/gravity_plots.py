@@ -20,8 +20,13 @@ from matplotlib.collections import PatchCollection
 from matplotlib.patches import Rectangle
 
 from motes import gravity
+from motes.interact.gravity.acceptance import acceptance
+from motes.interact.gravity.lanes import LANES, read, write
 from motes.interact.gravity.multipole import Plan, Problem
 from motes.interact.gravity.tree import END, FIRST, MASS, NUMBER, RADIUS, START, Box, Tree
+from motes.interact.gravity.walk import FULL
+from motes.jit import jit
+from motes.machine.lanes import choose
 
 FOLDER = Path(__file__).resolve().parent / "pictures"
 ORDER, LEAF, ALLOWED = 5, 24, 2e-3
@@ -38,38 +43,54 @@ def disc(n: int) -> Any:
     return x[r < 6.5]
 
 
+IS_FAR = acceptance(ORDER, ORDER, np.float64)
+
+
+@jit(numba=False)
+def judge(balls: Any, chosen: Any, mass: Any, own: Any, stricter: Any, found: Any) -> None:
+    """Write whether the chosen cells are far from the ball `own`."""
+    far, _, _ = IS_FAR(balls, chosen, read(mass, 0), own, (stricter, stricter), 1.0, 0.0, 0.0)
+    write(found, 0, choose(far, 1.0, 0.0))
+
+
+def is_far(tree: Tree, target: int, cell: int) -> bool:
+    """Whether the walk takes a cell's expansion for a target cell."""
+    chosen, found = np.full(LANES, cell, np.int32), np.zeros(LANES)
+    start, end = tree.cells[target, :2]
+    stricter = np.sqrt(max(end - start, FULL) / FULL) / ALLOWED
+    mass = np.full(LANES, tree.bodies[cell, MASS])
+    judge(tree.balls, chosen, mass, tree.balls[target], stricter, found)
+    return bool(found[0])
+
+
 def met(tree: Tree, leaf: int) -> tuple[list[int], list[int]]:
     """Cells whose expansions the leaf's target cells use, and leaves that it sums by pairs."""
     far: list[int] = []
     candidates, target = [0], 0
     while True:
         near: list[int] = []
-        x, _, radius, _ = parts(tree, target)
         inner = tree.cells[target, NUMBER] > 0
+        radius = tree.bodies[target, RADIUS]
         while candidates:
             cell = candidates.pop()
-            y, mass, reach, children = parts(tree, cell)
-            r2 = float(((x - y) ** 2).sum())
-            q2 = (radius + reach) ** 2 / r2 if r2 else np.inf
-            crowd = max(radius / reach, 1) ** 4 if reach else 1
-            if q2 < 1 and mass * crowd / r2 * q2 ** (ORDER / 2) / (1 - q2) < ALLOWED:
+            children = children_of(tree, cell)
+            if is_far(tree, target, cell):
                 far.append(cell)
-            elif children and not (inner and reach < radius):
+            elif children and not (inner and tree.bodies[cell, RADIUS] < radius):
                 candidates += children
             else:
                 near.append(cell)
         if not inner:
             return far, near
         start = tree.cells[leaf, START]
-        target = next(c for c in parts(tree, target)[3] if tree.cells[c, END] > start)
+        target = next(c for c in children_of(tree, target) if tree.cells[c, END] > start)
         candidates = near
 
 
-def parts(tree: Tree, cell: int) -> tuple[Any, float, float, list[int]]:
-    """Center, mass, radius and children of a cell."""
-    body, first = tree.bodies[cell], int(tree.cells[cell, FIRST])
-    children = list(range(first, first + int(tree.cells[cell, NUMBER])))
-    return body[:3], float(body[MASS]), float(body[RADIUS]), children
+def children_of(tree: Tree, cell: int) -> list[int]:
+    """Rows of a cell's children."""
+    first = int(tree.cells[cell, FIRST])
+    return list(range(first, first + int(tree.cells[cell, NUMBER])))
 
 
 def cells() -> None:

@@ -186,12 +186,12 @@ def crossover(tolerance: float, dtype: np.dtype[Any]) -> float:
     """Number of particles from which the multipole method is faster than direct sums.
 
     A fit to measurements on a processor with AVX2, where both take as long (two cores, a Plummer
-    sphere): 10 000, 20 000 in single precision at 1e-3, 1e-5; 4 500, 7 000, 28 000 in double at
+    sphere): 9 700, 16 700 in single precision at 1e-3, 1e-5; 3 600, 4 600, 26 000 in double at
     1e-3, 1e-5, 1e-8.
     """
     digits = max(-math.log10(tolerance), 2.0)
-    base: float = 10_000.0 if dtype == np.float32 else 4_500.0
-    return base * math.pow(1.42, digits - 3.0)
+    base, growth = (9_700.0, 1.31) if dtype == np.float32 else (3_300.0, 1.48)
+    return base * math.pow(growth, digits - 3.0)
 
 
 def _points(values: ArrayLike, name: str) -> NDArray[Any]:

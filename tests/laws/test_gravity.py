@@ -149,6 +149,25 @@ def test_results_do_not_depend_on_the_number_of_threads(tolerance):
     assert np.array_equal(results[0], results[2])
 
 
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+@pytest.mark.parametrize("tolerance", [None, 1e-5])
+def test_one_two_and_three_bodies(real, tolerance):
+    """m / r^2 and m / r by hand: alone, side by side, and at the corners of an even triangle."""
+    options = {"tolerance": tolerance, "method": "direct" if tolerance is None else "multipole"}
+    x = np.array([[0, 0, 0], [2, 0, 0], [1, math.sqrt(3), 0]], real)
+    a, phi = gravity.field(x[:1], np.ones(1), **options)
+    assert not a.any()
+    assert not phi.any()
+    a, phi = gravity.field(x[:2], np.array([1.0, 4.0]), **options)
+    np.testing.assert_allclose(a, [[1, 0, 0], [-0.25, 0, 0]], rtol=2e-6)
+    np.testing.assert_allclose(phi, [-2, -0.5], rtol=2e-6)
+    a, phi = gravity.field(x, np.ones(3), **options)
+    center = x.mean(axis=0)
+    pull = 2 * math.cos(math.pi / 6) / 4
+    np.testing.assert_allclose(a, pull * (center - x) * math.sqrt(3) / 2, rtol=2e-6, atol=1e-6)
+    np.testing.assert_allclose(phi, -1, rtol=2e-6)
+
+
 def test_nothing_is_pulled_by_nothing():
     none = np.zeros((0, 3))
     assert gravity.acceleration(none, np.zeros(0)).shape == (0, 3)

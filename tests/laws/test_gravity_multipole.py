@@ -170,7 +170,7 @@ def far(distance, opening=1.0, reach=0.0, error=np.inf, softening=0.0, order=6):
     balls, found = np.zeros((LANES, 8)), np.zeros((2, LANES))
     balls[:, 0], balls[:, 6], balls[:, 7] = 5.0, 0.3, 0.2
     balls[1, :3] = own[:3] + distance * np.array([2, 1, -2]) / 3
-    is_far, chosen = acceptance(order, order - 2), np.arange(LANES, dtype=np.int32)
+    is_far, chosen = acceptance(order, order - 2, np.float64), np.arange(LANES, dtype=np.int32)
 
     @jit(numba=False)
     def test(balls, chosen, mass, own, stricter, opening2, reach, e2, found):

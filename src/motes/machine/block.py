@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -198,23 +199,42 @@ class Writer:
 
     def counted(self, count: str, body: Any) -> None:
         """A loop that calls `body(index)` to write its code for index 0, 1, ... count - 1."""
+        self.carried("0", count, (), lambda index, _: body(index) or ())
+
+    def carried(
+        self,
+        first: str,
+        last: str,
+        values: Sequence[Scalar],
+        body: Callable[..., Any],
+        mark: str = "",
+    ) -> list[Scalar]:
+        """A loop of `values = body(index, values)` for index first, ... last - 1.
+
+        `mark` tells the compiler something of its jump back.
+        """
         before = self.block
         assert before is not None
         top = self.new_block()
         self.jump(top)
         self.block = top
-        index, following = self.register(), self.register()
+        begin = [Scalar(INT, first), *values]
+        names = [Scalar(value.type, self.register()) for value in begin]
         phi = len(top.lines)
-        top.lines.append("")
-        inside, after = self.fork(self.do(f"icmp slt i64 {index}, {count}"))
+        index = names[0]
+        inside, after = self.fork(self.do(f"icmp slt i64 {index.text}, {last}"))
         self.block = inside
-        body(Scalar(INT, index))
+        found = body(index, names[1:])
+        end = [Scalar(INT, self.do(f"add nsw i64 {index.text}, 1")), *found]
         assert self.block is not None
-        self.line(f"{following} = add nsw i64 {index}, 1")
-        ways = f"[ 0, %{before.label} ], [ {following}, %{self.block.label} ]"
-        top.lines[phi] = f"{index} = phi i64 {ways}"
-        self.jump(top)
+        top.lines[phi:phi] = [
+            f"{name.text} = phi {name.type.llvm} "
+            f"[ {a.text}, %{before.label} ], [ {b.text}, %{self.block.label} ]"
+            for name, a, b in zip(names, begin, end, strict=True)
+        ]
+        self.line(f"br label %{top.label}{mark}")
         self.block = after
+        return names[1:]
 
 
 def _same(a: Value, b: Value) -> bool:

@@ -84,9 +84,17 @@ class Module:
             first = 2 * number + 1
             tables.append(f'!{first} = !{{!"{item.name}", !0, i64 0}}')
             tables.append(f"!{first + 1} = !{{!{first}, !{first}, i64 0}}")
+        if any(ROLLED in text for text in self._texts):
+            tables += [f"{ROLLED} = distinct !{{{ROLLED}, {ROLLED}0}}", ROLLED_MEANS]
         written = [*self.known.values(), *self._texts]
         parts = [*sorted(self.declarations), *written, door(name, result, kinds), *tables]
         return "\n".join(parts)
+
+
+ROLLED = "!999999"
+"""Mark of the jump back of a loop that is to stay one."""
+
+ROLLED_MEANS = f'{ROLLED}0 = !{{!"llvm.loop.unroll.disable"}}'
 
 
 def door(name: str, result: Type, kinds: Sequence[Type]) -> str:

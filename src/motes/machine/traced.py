@@ -1,8 +1,8 @@
 """Straight-line machine code from a formula in Python.
 
 A formula reads and writes arrays at places that Python knows, in loops over lists of terms. Traced,
-it runs once, with registers for numbers, and what it did becomes the code of one operation without
-loops. Called on NumPy arrays, it does the same slowly.
+it runs once, with registers for numbers, and what it did becomes the code of one operation, without
+loops but those that it asks for with `repeated`. Called on NumPy arrays, it does the same slowly.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from motes.machine.block import literal
 from motes.machine.kinds import INT, INT32, Number, Unsupported
+from motes.machine.module import ROLLED
 from motes.machine.target import widest
 from motes.machine.values import Group, Known, Scalar, Value, View, Written
 
@@ -22,6 +23,12 @@ LANES = widest()
 
 FLAGS = "contract"
 """Multiply-adds may be fused; the order of sums stands, as the compiler knows no better one."""
+
+FITTING = (9, 5)
+"""Lanes that 16 registers hold besides what they are multiplied by, of one register and of two."""
+
+MANY = 12
+"""Rounds from which a loop is worth one: fewer are written one after the other."""
 
 PART = 4
 """Numbers that a processor exchanges between registers in one step: 128 bits of single ones."""
@@ -166,6 +173,63 @@ def inverse_root(lanes: Any) -> Any:
         return lanes.dtype.type(1) / np.sqrt(lanes)
     root = Wire(lanes.writer, lanes.writer.intrinsic("sqrt", lanes.value))
     return ones(lanes) / root
+
+
+def repeated(
+    array: Any, first: int, last: int, values: list[Any], body: Callable[..., list[Any]]
+) -> list[Any]:
+    """The last of `values = body(k, values)`, k = first ... last - 1: if they are many, in a loop.
+
+    `array` is any that the formula has been given.
+    """
+    if not isinstance(array, _Array) or last - first < MANY:
+        for k in range(first, last):
+            forget(array)
+            values = body(k, values)
+        return values
+    writer = array.writer
+
+    def step(index: Scalar, inner: list[Scalar]) -> list[Scalar]:
+        return [wire.value for wire in body(index.text, [Wire(writer, v) for v in inner])]
+
+    start = [wire.value for wire in values]
+    found = writer.carried(str(first), str(last), start, step, f", !llvm.loop {ROLLED}")
+    return [Wire(writer, value) for value in found]
+
+
+def held(lanes: Any) -> int:
+    """How many of such lanes registers hold, with some to spare."""
+    if not isinstance(lanes, Wire):
+        return FITTING[0]
+    several = lanes.value.type.bits * widest() > 256 and widest() == 8
+    return FITTING[several]
+
+
+def shifted(array: Any, row: Any, shifts: Sequence[int]) -> list[Any]:
+    """Rows of an array, `shifts` after one which need not be known."""
+    if isinstance(row, str):
+        return [array[place(array.writer, row, shift)] for shift in shifts]
+    return [array[row + shift] for shift in shifts]
+
+
+def whole(numbers: Any, k: Any) -> Any:
+    """An integer out of an array of 32 bits."""
+    if not isinstance(numbers, _Array):
+        return int(numbers[k])
+    return numbers.writer.cast(numbers.lanes(str(k), INT32), INT).text
+
+
+def zeros(like: Any) -> Any:
+    """0 in each lane."""
+    if not isinstance(like, Wire):
+        return np.zeros_like(like)
+    return Wire(like.writer, literal(0.0, like.value.type))
+
+
+def forget(array: Any) -> None:
+    """Keep machine code from holding in registers, or beside them, what arrays hold anyway."""
+    if isinstance(array, _Array):
+        array.writer.line('fence syncscope("singlethread") acq_rel')
 
 
 def ones(like: Any) -> Any:

@@ -14,7 +14,7 @@ from motes.jit import EXACT, jit
 from motes.machine.lanes import choose
 from motes.machine.traced import gathered, traced
 
-LEAST = np.float32(0.1)
+LEAST = 0.1
 """Square of the smallest ratio of radii that makes a difference."""
 
 
@@ -33,7 +33,22 @@ def columns(contents: Any, chosen: Any) -> Any:
 
 
 @cache
-def acceptance(order: int, low: int) -> Callable[..., Any]:
+def power(exponent: int) -> Callable[..., Any]:
+    """Compiled function x -> x^exponent, an exponent of at least 1, by squares."""
+    if exponent == 1:
+        return jit(inline=True)(lambda x: x)  # type: ignore[no-any-return]
+    root, odd = power(exponent // 2), exponent % 2 == 1
+
+    @jit(inline=True, flags=EXACT)
+    def raised(x: Any) -> Any:
+        y = root(x)
+        return y * y * x if odd else y * y
+
+    return raised  # type: ignore[no-any-return]
+
+
+@cache
+def acceptance(order: int, low: int, real: type) -> Callable[..., Any]:
     """Compiled function that tests LANES source cells together, for expansions of two orders.
 
     (balls, chosen, mass, own, stricter, opening2, reach, e2) -> lanes: whether the rows `chosen` of
@@ -47,6 +62,8 @@ def acceptance(order: int, low: int) -> Callable[..., Any]:
     is allowed, for both orders. q^2 is below `opening2`, the balls are more than `reach` apart, and
     e2 is added to R^2.
     """
+    one, least = real(1), real(LEAST)
+    power_of_order, power_of_low = power(order), power(low)
 
     @jit(inline=True, flags=EXACT)
     def is_far(
@@ -57,18 +74,16 @@ def acceptance(order: int, low: int) -> Callable[..., Any]:
         r2 = x * x + y * y + z * z + e2
         radii = radius + own[6]
         gap, square = radii + reach, radii * radii
-        inverse = 1 / r2
-        rest = 1 - square * inverse
+        inverse = one / r2
+        rest = one - square * inverse
         spreads = spread + own[6]
-        q2 = spreads * spreads * inverse
+        q = np.sqrt(spreads * spreads * inverse)
         own2 = own[6] * own[6]
-        smaller = own2 / (radius * radius + own2 * LEAST)
-        pull = mass * inverse * choose(smaller > 1, smaller * smaller, 1)
-        allowed = rest * rest
-        first, second = pull * stricter[0], pull * stricter[1]
+        smaller = own2 / (radius * radius + own2 * least)
+        pull = mass * inverse * choose(smaller > one, smaller * smaller, one)
         apart = (r2 > gap * gap) & (square < opening2 * r2)
-        far = apart & (first * first * q2**order < allowed)
-        easy = far & (second * second * q2**low < allowed)
+        far = apart & (pull * stricter[0] * power_of_order(q) < rest)
+        easy = far & (pull * stricter[1] * power_of_low(q) < rest)
         return far, easy, radius
 
     if isinstance(is_far, FunctionType):

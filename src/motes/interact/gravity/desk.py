@@ -7,9 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from motes.interact.gravity.expansions import ROOM, places
 from motes.interact.gravity.lanes import LANES
 from motes.interact.gravity.morton import LEVELS
 from motes.interact.gravity.translations import Translations, padded
+from motes.memory import allocate
 
 SOURCES = 1536
 """Sources that are packed for one sum over pairs: in single precision they fit the first cache."""
@@ -60,6 +62,10 @@ class Desk(NamedTuple):
     """(stack,) source cells to test."""
     local: NDArray[Any]
     """(stack, padded basis) local terms of waiting target cells."""
+    places: NDArray[np.int32]
+    """Rows of `room` that moments are multiplied by."""
+    room: NDArray[Any]
+    """(ROOM, lanes) what `moments_to_local` needs room for."""
     gathered: NDArray[Any]
     """(basis, lanes) local terms being summed."""
     target: NDArray[Any]
@@ -76,7 +82,7 @@ class Desk(NamedTuple):
     """(4, lanes) some sources in double precision."""
 
 
-def desk(operations: Translations, real: type, largest: int, capacity: int) -> Desk:
+def desk(operations: Translations, harmonic: bool, real: type, largest: int, capacity: int) -> Desk:
     """Working memory for target leaves of at most `largest` and `capacity` candidates."""
     width = -(-largest // LANES) * LANES
     return Desk(
@@ -88,7 +94,9 @@ def desk(operations: Translations, real: type, largest: int, capacity: int) -> D
         waiting=np.empty((_STACK, 3), np.int32),
         opened=np.zeros(_STACK, np.int32),
         local=np.zeros((_STACK, padded(operations.basis)), real),
-        gathered=np.empty((operations.basis, LANES), real),
+        places=np.array(places(harmonic), np.int32),
+        room=allocate((ROOM, LANES), real, "expansions"),
+        gathered=allocate((operations.basis, LANES), real, "expansions"),
         target=np.zeros((3, width), real),
         source=np.zeros((4, SOURCES + LANES), real),
         spans=np.empty((SOURCES, 2), np.int32),

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from math import factorial, prod
 from typing import Any
 
@@ -26,6 +27,16 @@ UNITS: tuple[Index, Index, Index] = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 TOGETHER = 6
 """Sums that are formed together: as many as registers hold, with what they share."""
+
+
+SIDE = {True: 13, False: 9}
+"""Derivatives along an axis from 0 up, of harmonic and other potentials."""
+
+MOMENTS = max(3 * SIDE[True] ** 2, SIDE[False] ** 3)
+"""Row after those of derivatives."""
+
+ROOM = MOMENTS + SIDE[True] ** 2
+"""Rows in all."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +165,51 @@ def _along(
             places.append((values.get((b[0], b[1], b[2])), m))
         sums.append([(value, factors[m]) for value, m in places if value is not None])
     return dict(zip(wanted, products(sums), strict=True))
+
+
+def row_of(t: Index, harmonic: bool) -> int:
+    """Row of D_t where sums over pairs of terms look for it: row_of(a + b) is the sum of rows."""
+    side = SIDE[harmonic]
+    return t[0] + side * (t[1] + side * t[2])
+
+
+def without_first(basis: tuple[Index, ...]) -> list[Index]:
+    """The terms of another degree than the first."""
+    return [b for b in basis if sum(b) != 1]
+
+
+def places(harmonic: bool) -> list[int]:
+    """Rows of D_b for the terms of `without_first`, which are the same for all orders."""
+    return [row_of(b, harmonic) for b in without_first(terms(SIDE[harmonic] - 1, harmonic).basis)]
+
+
+def stairs(kind: Terms, most: int) -> list[tuple[range, list[tuple[range, int, int]]]]:
+    """Which a and b the sums over b of M_b D_{a+b}, |a| + |b| <= p, are over, step by step.
+
+    For places of up to `most` a in the basis each: steps of some of them, and the first and
+    last + 1 of the b among `without_first`, all of which go with all a of the step.
+    """
+    order, basis = kind.order, kind.basis
+    ends = [sum(sum(b) <= degree for b in without_first(basis)) for degree in range(order + 1)]
+    steps, first = [], 0
+    while first < len(basis):
+        degree = sum(basis[first])
+        while sum(sum(a) <= degree + 1 for a in basis) - first <= most and degree < order:
+            degree += 1
+        last = sum(sum(a) <= degree for a in basis)
+        parts = -(-(last - first) // most)
+        cuts = [first + (last - first) * k // parts for k in range(parts + 1)]
+        for low, high in pairwise(cuts):
+            begin, some = 0, []
+            for highest in range(degree, sum(basis[low]) - 1, -1):
+                end = ends[order - highest]
+                if begin < end:
+                    those = sum(sum(a) <= highest for a in basis[:high])
+                    some.append((range(low, those), begin, end))
+                begin = end
+            steps.append((range(low, high), some))
+        first = last
+    return steps
 
 
 def powers(order: int, ratio: Any, one: Any) -> list[Any]:

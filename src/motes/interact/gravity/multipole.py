@@ -7,7 +7,7 @@ Computational Astrophysics and Cosmology 1 (2014) 1, for acceptance by an estima
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from queue import SimpleQueue
 from typing import Any
 
@@ -47,17 +47,21 @@ ENOUGH = 5.0
 EASIER = 8.0
 """How many times less an expansion of the lower order may neglect: there are many of them."""
 
+FAR = 0.5
+"""Part of what may be at which one tries again; from there on what is left is used up untried, as
+the error grows at most in proportion."""
+
 TRIALS = 8
 """Trials before all is summed by pairs."""
 
 TASKS, FEWEST_TASKS, PARTICLES_OF_A_TASK = 128, 8, 2048
 """Parts of the walk; each of the threads takes one after the other. A part costs 0.1 ms more."""
 
-STRICTER, STRICTEST, LOW_ORDER = 10.0, 100.0, 5
+STRICTER, STRICTEST, LOW_ORDER = 6.0, 100.0, 5
 """How much less the walk that the sample is compared with may neglect, and how much below an order:
 there errors fall slowly, as many are alike."""
 
-HIGHEST = {True: 12, False: 8}
+HIGHEST = {True: 11, False: 8}
 """Highest order of harmonic expansions and of others: more would not be faster."""
 
 
@@ -81,8 +85,9 @@ def plan(tolerance: float, law: str) -> Plan:
     """Order, leaf size and precision that are fast at a tolerance, found by measurement."""
     digits = -math.log10(tolerance)
     real = np.float32 if tolerance >= SINGLE_FROM else np.float64
-    order = min(max(2, int(1.3 * digits + 1.5)), HIGHEST[law != "plummer"])
-    return Plan(order, max(order - 2, 1), leaf=32 if digits < 4 else 48, real=real)
+    order = min(max(2, int(2 * digits - 0.99)), HIGHEST[law != "plummer"])
+    leaf = 48 if digits > 4.2 and real is np.float32 else 28
+    return Plan(order, max(int(0.72 * order), 1), leaf, real)
 
 
 def multipole(
@@ -118,6 +123,8 @@ class Problem:
     plan: Plan
     out: NDArray[Any]
     """Room for sums (4, n) or (3, n), in the order of the tree."""
+    desks: list[Desk] = field(default_factory=list)
+    """Working memory of walks that are over."""
 
     @staticmethod
     def build(
@@ -182,9 +189,10 @@ class Problem:
                 exact = self._at(sample, strict)
             part = self._error(sample, self._at(sample, limits), exact) / (SAFETY * tolerance)
             if part <= 1.0:
-                if kept is not None or part > 0.7 or share >= MOST * tolerance:
-                    return limits
-                kept = limits
+                more = min(1 / max(part, FAR), MOST * tolerance / share)
+                kept = limits._replace(error=more * limits.error)
+                if part > FAR or share >= MOST * tolerance:
+                    return kept
             elif kept is not None:
                 return kept
             share *= min(max(0.9 / max(part, 1e-9), 0.05), 3.0)
@@ -215,17 +223,23 @@ class Problem:
         walk = walker(self.law, self.plan.real, self.potential, self.plan.order, self.plan.low)
         operations = translations(self.plan.order, self.law != "plummer")
         same, largest, out = self.targets is self.sources, self.targets.largest, self.out
+        harmonic = self.law != "plummer"
+
+        def new(candidates: int) -> Desk:
+            return desk(operations, harmonic, self.plan.real, largest, candidates)
+
         desks: SimpleQueue[Desk] = SimpleQueue()
         for _ in range(threads()):
-            desks.put(desk(operations, self.plan.real, largest, 1 << 16))
+            desks.put(self.desks.pop() if self.desks else new(1 << 16))
 
         def task(number: int) -> None:
             own = desks.get()
             while walk(self.targets, self.sources, same, parts[number], limits, own, out):
-                own = desk(operations, self.plan.real, largest, 2 * own.candidates.size)
+                own = new(2 * own.candidates.size)
             desks.put(own)
 
         share(task, len(parts))
+        self.desks.extend(desks.get() for _ in range(threads()))
         return out
 
     def _at(self, sample: Sample, limits: Limits) -> NDArray[np.float64]:

@@ -18,7 +18,7 @@ LEAVES = 16
 LEAVES_OF_A_CLASS = 8
 """Target leaves out of each further class, which has twice as many as the one before."""
 
-DEVIATIONS = 2.0
+DEVIATIONS = 2.5
 """Standard errors of a mean square by which it may be larger than the sample says."""
 
 

@@ -13,6 +13,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from motes.interact.gravity.expansions import (
+    MOMENTS,
     UNITS,
     derivatives,
     folded,
@@ -20,26 +21,35 @@ from motes.interact.gravity.expansions import (
     plus,
     powers,
     products,
+    row_of,
     shifted_moments,
     shifted_terms,
+    stairs,
     terms,
     unfolded,
+    without_first,
 )
 from motes.machine.traced import (
     LANES,
+    forget,
     gathered,
+    held,
     inverse_root,
     ones,
+    repeated,
     rows,
     scattered,
+    shifted,
     total,
     traced,
+    whole,
     write,
     write_totals,
+    zeros,
 )
 
-STRAIGHT = 200
-"""Numbers in the longest expansion whose operations are straight-line code."""
+STRAIGHT = 6
+"""Highest order at which products of moments and derivatives stay in registers, without loops."""
 
 Operation = Callable[..., None]
 
@@ -57,10 +67,12 @@ class Translations(NamedTuple):
     those of its children; place[:3] is the parent's center from the child's and place[4] the
     child's radius, in the parent's radius; place[3] is 1, and 0 in unused lanes."""
     moments_to_local: Operation
-    """(balls, chosen, own, table, e2, local): add to `local` (basis, LANES) the terms, in a cell
-    with the ball `own`, of source cells whose balls and moments are rows `chosen` of two tables; e2
-    is the squared softening. Moments of the first degree are taken for 0, as they are around
-    centers of mass."""
+    """(balls, chosen, own, table, e2, places, room, local): add to `local` (basis, LANES) the
+    terms, in a cell with the ball `own`, of source cells whose balls and moments are rows `chosen`
+    of two tables; e2 is the squared softening. Moments of the first degree are taken for 0, as they
+    are around centers of mass. `room` (ROOM, LANES) is written to: derivatives where `row_of` says,
+    and scaled moments, whose products are summed in loops; `places` are those of the harmonic kind
+    or not."""
     lanes_to_local: Operation
     """(local, terms): add the lane sums of `local` (basis, LANES) to terms (basis,)."""
     local_to_local: Operation
@@ -101,25 +113,48 @@ def translations(order: int, harmonic: bool) -> Translations:
 
     @traced
     def moments_to_local(
-        balls: Any, chosen: Any, own: Any, table: Any, e2: Any, local: Any
+        balls: Any, chosen: Any, own: Any, table: Any, e2: Any, places: Any, room: Any, local: Any
     ) -> None:
         ball = gathered(balls, chosen, 8)
         x, y, z = (own[k] - ball[k] + (own[3 + k] - ball[3 + k]) for k in range(3))
         inverse = inverse_root(x * x + y * y + z * z + e2)
         slopes = derivatives(order, harmonic, (x * inverse, y * inverse, z * inverse), ones(x))
+        others = without_first(basis)
+        if order > STRAIGHT:
+            for t, value in slopes.items():
+                room[row_of(t, harmonic)] = value
+            forget(room)
         power = powers(order, ball[6] * inverse, inverse)
-        given = gathered(table, chosen, len(basis))
-        moments = {b: m * power[sum(b)] for b, m in zip(basis, given, strict=True)}
-        power = powers(order, own[6] * inverse, ones(x))
-        some = [b for b in basis if sum(b) != 1]
-        values = products(
-            [
-                [(moments[b], slopes[plus(a, b)]) for b in some if sum(a) + sum(b) <= order]
+        given = dict(zip(basis, gathered(table, chosen, len(basis)), strict=True))
+        moments = {b: given[b] * power[sum(b)] for b in others}
+        if order <= STRAIGHT:
+            power = powers(order, own[6] * inverse, ones(x))
+            pairs = [
+                [(moments[b], slopes[plus(a, b)]) for b in others if sum(a) + sum(b) <= order]
                 for a in basis
             ]
-        )
-        old = rows(local, len(basis))
-        write(local, [o + v * power[sum(a)] for o, a, v in zip(old, basis, values, strict=True)])
+            for n, value in enumerate(products(pairs)):
+                local[n] = local[n] + value * power[sum(basis[n])]
+            return
+        for k, b in enumerate(others):
+            room[MOMENTS + k] = moments[b]
+        forget(room)
+        power = powers(order, own[6] * inverse, ones(x))
+        for chunk, steps in stairs(kind, held(x)):
+            sums = {n: zeros(x) for n in chunk}
+            for some, first, last in steps:
+                shifts = [row_of(basis[n], harmonic) for n in some]
+
+                def add(k: Any, sums: list[Any], shifts: list[int] = shifts) -> list[Any]:
+                    moment = shifted(room, k, [MOMENTS])[0]
+                    row = row_of(others[k], harmonic) if isinstance(k, int) else whole(places, k)
+                    near = shifted(room, row, shifts)
+                    return [old + moment * slope for old, slope in zip(sums, near, strict=True)]
+
+                found = repeated(room, first, last, [sums[n] for n in some], add)
+                sums.update(zip(some, found, strict=True))
+            for n, value in sums.items():
+                local[n] = local[n] + value * power[sum(basis[n])]
 
     @traced
     def lanes_to_local(local: Any, terms: Any) -> None:

@@ -50,7 +50,9 @@ def _expander(operations: Translations) -> Callable[..., None]:
     def expand(sources: Tree, own: Any, e2: Any, far: Any, count: Any, desk: Desk) -> None:
         for lane in range(count, LANES):
             far[lane] = sources.cells.shape[0]
-        moments_to_local(sources.balls, far, own, sources.moments, e2, desk.gathered)
+        moments_to_local(
+            sources.balls, far, own, sources.moments, e2, desk.places, desk.room, desk.gathered
+        )
 
     return expand  # type: ignore[no-any-return]
 
@@ -72,7 +74,7 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
     lanes_to_local, local_to_particles = operations.lanes_to_local, operations.local_to_particles
     expand = _expander(operations)
     expand_easily = _expander(translations(low_order, harmonic))
-    is_far = acceptance(order, low_order)
+    is_far = acceptance(order, low_order, real)
     single, nothing = real is np.float32, real(0)
 
     @jit(flags=EXACT, numba=False)
