@@ -110,7 +110,8 @@ def describe_entry(kind: str, name: str) -> Entry:
 def _known(kind: str) -> None:
     if kind not in KINDS:
         menu = (*KINDS, *TABLES)
-        raise SceneError(f'no kind "{kind}".{likely(kind, menu)} There are: {", ".join(menu)}.')
+        hint = f"{likely(kind, menu)} There are: {', '.join(menu)}."
+        raise SceneError(f'no kind "{kind}".{hint}', source="")
 
 
 def _table(name: str) -> Entry:
@@ -119,7 +120,8 @@ def _table(name: str) -> Entry:
     sections: dict[str, Any] = {table: getattr(scene, table.capitalize()) for table in TABLES}
     if name not in sections:
         menu = ", ".join(TABLES)
-        raise SceneError(f'a scene has no table "{name}".{likely(name, TABLES)} It has {menu}.')
+        hint = f"{likely(name, TABLES)} It has {menu}."
+        raise SceneError(f'a scene has no table "{name}".{hint}', source="")
     section = sections[name]
     help = section.help()
     fields = tuple(field(p, help.get(key, "")) for key, p in section.parameters.items())

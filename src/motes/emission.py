@@ -16,7 +16,11 @@ from motes.catalog import Component
 from motes.control.constant import Constant
 from motes.control.curve import Curve
 from motes.control.spline import Spline
+from motes.memory import afford
 from motes.philox import address, birth_number
+
+BIRTH = 40
+"""Bytes that a birth takes until it is a row: its number twice, its instant, and copies."""
 
 
 @dataclass(frozen=True)
@@ -62,19 +66,28 @@ class Clock:
         return sorted(found)
 
     def sources(self, begin: float, end: float) -> list[Source]:
-        """Births in begin < t <= end (and at the very start, in the first step)."""
+        """Births in begin < t <= end (and at the very start, in the first step).
+
+        Raises:
+            MemoryBudgetError: they are more than fit into memory.
+        """
         result = []
         first = begin <= self.start
         for time, count, number in self._bursts:
             if begin < time <= end or (first and time <= begin):
+                self._afford(count)
                 numbers = np.arange(1, count + 1, dtype=np.uint64)
                 result.append(Source(number, numbers, np.full(count, max(time, begin))))
         low, high = self._integral(begin), self._integral(end)
+        self._afford(high - low)
         k = np.arange(np.floor(low) + 1, np.floor(high) + 1)
         if k.size:
             times = np.clip(self._when(k), begin, end)
             result.append(Source(self._number, k.astype(np.uint64), times))
         return result
+
+    def _afford(self, births: float) -> None:
+        afford(int(births) * BIRTH, f'emitter "{self.name}": {births:.3g} births in one step')
 
     def silent(self, begin: float, end: float) -> bool:
         """Whether `sources` gives none."""

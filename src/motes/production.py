@@ -16,9 +16,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from motes.catalog import catalog
+from motes.catalog.scripts import script_of
 from motes.errors import SceneError
 from motes.files import make_folder
 from motes.frame import Frame
+from motes.jit import cache_folder
 from motes.progress import Report, Watch
 from motes.record.frames import FrameStore, Manifest, digest_of
 from motes.rehearsal import Rehearsal
@@ -40,9 +43,9 @@ STILLS = 6
 HELD = 1 << 28
 """Most memory of frames that wait until the first still is drawn [bytes]."""
 
-PATIENCE, LEAST, EARLY = 2.0, 0.5, 5.0
+PATIENCE, EARLY = 2.0, 4.0
 """A first picture is drawn after `PATIENCE` of simulating frames [s], though the first still is not
-reached; after `LEAST`, if `EARLY` have passed since all began."""
+reached; of the first frame, if `EARLY` have passed since all began."""
 
 WAITING = 3
 """Frames that may wait for the disk and the encoder; more would only use memory."""
@@ -89,10 +92,16 @@ def film(
         OutputError: a file cannot be written.
         SimulationError: the simulation cannot go on.
     """
+    from motes.scene.document import a_scene
     from motes.simulation import Simulation
 
     report, begun = Report(watch), time.monotonic()
-    with Rehearsal(scene) as rehearsal, report.compiling(rehearsal.begin if draw else None):
+    with (
+        Rehearsal(a_scene(scene)) as rehearsal,
+        report.compiling(rehearsal.begin if draw else None),
+    ):
+        if draw and not (cache_folder() / "kernels").is_dir():
+            rehearsal.begin()  # Nothing has ever been compiled here.
         simulation = Simulation(scene)
         numbers = _numbers(first, last, range(1, simulation.frame_count + 1))
         report.begin(len(numbers))
@@ -129,6 +138,7 @@ def redraw(
     from motes.scene import drawable, from_document
 
     store = open_frames(folder)
+    _require(store.manifest.scripts)
     document = drawable(store.manifest.scene)
     scene = from_document(document, source=str(store.folder / "manifest.json"))
     scene = scene.with_values(values or {})
@@ -172,7 +182,25 @@ def _manifest(scene: Scene, name: str) -> Manifest:
     parts = [part for owner in owners for name in lists for part in getattr(owner, name, ())]
     sources = {f"{part.kind.name}/{part.type}": part.source() for part in parts}
     digest = digest_of(release, document, sources)
-    return Manifest(name, document, digest, float(scene.film.fps), release)
+    scripts = {
+        f"{part.kind.name}/{part.type}": script
+        for part in (*parts, *(system.look for system in scene.systems))
+        if (script := script_of(type(part))) is not None
+    }
+    return Manifest(name, document, digest, float(scene.film.fps), release, scripts)
+
+
+def _require(scripts: Mapping[str, str]) -> None:
+    """Refuse to draw without the solids and looks that somebody's own file declares."""
+    for address, script in scripts.items():
+        kind, _, part = address.partition("/")
+        if kind not in ("solid", "look") or part in catalog(kind):
+            continue
+        where, fix = "at a prompt or in a notebook", "Call motes.redraw there."
+        if script:
+            where = f"in {script}"
+            fix = f"Add --components {script}, which runs that file, or call motes.redraw in it."
+        raise SceneError(f'the {kind} "{part}" was declared {where}. {fix}', source="")
 
 
 def _kept(
@@ -182,11 +210,15 @@ def _kept(
     follower: _Follower,
     report: Report,
 ) -> Iterator[Frame]:
-    """Frames of a simulation, each on its way to the store before anybody draws it."""
+    """Frames of a simulation, each on its way to the store before anybody draws it.
+
+    Energies are noted when the next one is asked for, so that the first picture need not wait.
+    """
     frames, told = simulation.frames(first=numbers[0], last=numbers[-1]), 0
     interacts = bool(store.manifest.scene.get("interact"))
     for frame in report.simulated(frames, simulation):
         follower.add(store.write, frame)
+        yield frame
         if interacts:
             # Of the last whole step before the frame, whose time they state.
             captures = simulation.captures
@@ -196,7 +228,6 @@ def _kept(
             noted = frame.index, simulation.measure(), captures[told:]
             follower.add(lambda noted: store.note(*noted), noted)
             told = len(captures)
-        yield frame
 
 
 def _draw(
@@ -244,7 +275,7 @@ def _ahead(frames: Iterable[Frame], still: int, begun: float) -> list[Frame]:
     """The frames up to the first still, or as many as may wait in memory and be waited for."""
     held: list[Frame] = []
     room, now = HELD, time.monotonic()
-    late = min(now + PATIENCE, max(now + LEAST, begun + EARLY))
+    late = min(now + PATIENCE, begun + EARLY)
     for frame in frames:
         held.append(frame)
         room -= sum(a.nbytes for columns in frame.systems.values() for a in columns.values())

@@ -30,7 +30,7 @@ from motes.philox import channel
 from motes.record.energy import Matter, Measures, measure
 from motes.repeat import Repeat, Repeats
 from motes.scene.address import component_address
-from motes.scene.document import Scene, System
+from motes.scene.document import Scene, System, a_scene
 from motes.state import Particles, State
 from motes.step import Interval, Stepper
 from motes.view import View
@@ -50,7 +50,7 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+        self.scene = a_scene(scene)
         self._lead_in = round(scene.prewarm / scene.step)
         self.start = -self._lead_in * scene.step
         """Scene time at which the first step begins: 0 less the steps nearest to the prewarm."""
@@ -173,7 +173,8 @@ class Simulation:
     def __getitem__(self, name: str) -> View:
         if name not in self._systems:
             menu = ", ".join(self._systems)
-            raise SceneError(f'no system "{name}".{likely(name, self._systems)} There are: {menu}.')
+            hint = f"{likely(name, self._systems)} There are: {menu}."
+            raise SceneError(f'no system "{name}".{hint}', source="")
         return View(
             self._state.systems[name],
             self._steppers[name].system,

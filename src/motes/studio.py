@@ -15,11 +15,12 @@ from motes.compile.surfaces import write_surfaces
 from motes.compile.text import Text
 from motes.control.control import Control
 from motes.control.curve import Curve
+from motes.errors import SceneError
 from motes.figure import assembled
 from motes.frame import Frame
 from motes.renderer import Camera, Film, Layer, Picture, Renderer, Sky, Solids, Stars, Sun
 from motes.scene.address import component_address
-from motes.scene.document import Scene
+from motes.scene.document import Scene, a_scene
 
 
 def picture(frame: Frame, scene: Scene, *, size: tuple[int, int] | None = None) -> Picture:
@@ -34,12 +35,13 @@ class Studio:
     """Draws frames of one scene; backdrops that do not change are drawn once."""
 
     def __init__(self, scene: Scene, *, size: tuple[int, int] | None = None) -> None:
-        self.scene = scene
+        self.scene = a_scene(scene)
         film = scene.film
         width, height = size or film.size
         self._film = Film(size=(int(width), int(height)), tone=film.tone, bloom=float(film.bloom))
         self._renderers: dict[float, Renderer] = {}
         self._shutter = float(film.shutter) / float(film.fps)
+        self._looks = {system.name: system.look for system in scene.systems}
 
     def draw(self, frame: Frame) -> Picture:
         """The picture of one frame; the shutter opens at its time."""
@@ -89,7 +91,14 @@ class Studio:
         )
 
     def _layer(self, name: str, columns: Mapping[str, NDArray[Any]], time: float) -> Layer:
-        look = next(s.look for s in self.scene.systems if s.name == name)
+        look = self._looks.get(name)
+        if look is None:
+            menu = ", ".join(self._looks) or "none"
+            raise SceneError(
+                f'the frame has a system "{name}", and the scene has {menu}: '
+                "the frame was made of another scene.",
+                source="",
+            )
         figure = type(look).kernel("figure")
         if figure is not None:
             own = vars(type(look))

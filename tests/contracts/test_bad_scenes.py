@@ -261,7 +261,7 @@ def test_a_scene_that_is_not_there_gives_the_menu(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"no file .*The gallery has: .*sprinkler"):
         load(tmp_path / "nothing.toml")
     (tmp_path / "folder.toml").mkdir()
-    with pytest.raises(SceneError, match="no file"):
+    with pytest.raises(SceneError, match=r"^a folder, not a scene: "):
         load(tmp_path / "folder.toml")
 
 
@@ -274,3 +274,37 @@ def test_faults_in_python_have_no_file() -> None:
     ]
     with pytest.raises(SceneError, match='emitter "cone" cannot stand in force'):
         System("a", force=[motes.emit.Cone()])
+
+
+def test_a_name_that_is_no_text_is_one_fault() -> None:
+    with pytest.raises(SceneError) as error:
+        loads("[[system]]\nname = 3\n")
+    (line,) = error.value.lines()
+    assert line == "scene:2: system: a name must be a word of letters, digits, _ and -, not 3."
+
+
+def test_a_folder_in_place_of_a_scene_is_called_one(tmp_path: Path) -> None:
+    for name in ("dir", "dir.toml"):
+        (tmp_path / name).mkdir()
+        with pytest.raises(SceneError, match=r"^a folder, not a scene: "):
+            load(tmp_path / name)
+
+
+def test_a_folder_of_the_name_of_a_scene_does_not_hide_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("sprinkler").mkdir()
+    assert load("sprinkler").title == "Sprinkler"
+
+
+def test_half_a_surrogate_pair_has_its_line() -> None:
+    with pytest.raises(SceneError) as error:
+        loads('{\n"title": "\\ud83d\\ude00",\n"about": "\\ud800"}', format="json")
+    assert error.value.problems[0].line == 3
+
+
+def test_the_name_of_a_scene_is_not_a_scene() -> None:
+    for taking in (motes.Simulation, motes.Studio, lambda s: motes.film(s, "nowhere")):
+        with pytest.raises(TypeError, match=r'Write motes\.load\("sprinkler"\)'):
+            taking("sprinkler")  # type: ignore[arg-type]

@@ -242,6 +242,22 @@ def test_info_shows_kept_frames(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert facts["systems"]["water"]["position"] == {"dtype": "float32", "shape": [100, 3]}
 
 
+def test_info_names_damaged_frames_and_shows_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = FrameStore.create(tmp_path / "frames", MANIFEST)
+    for index in (1, 2):
+        store.write(jet(index))
+    data = bytearray(store.path(2).read_bytes())
+    data[-1] ^= 1
+    store.path(2).write_bytes(data)
+    assert outcome("info", str(tmp_path), "--check") == 74
+    printed = capsys.readouterr()
+    assert "in frame 1" in " ".join(printed.out.split())
+    assert printed.err.startswith(f"{store.path(2)} is damaged: ")
+    assert printed.err.count("\n") == 1
+
+
 @pytest.mark.parametrize("command", ["info", "render"])
 def test_a_folder_without_frames_is_an_input_error(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
@@ -309,6 +325,31 @@ def test_a_closed_pipe_ends_quietly() -> None:
         ["bash", "-c", f"set -o pipefail; {program}"], capture_output=True, text=True
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a shell that closes stdout")
+def test_a_closed_stdout_is_no_fault() -> None:
+    command = f"{sys.executable} -c 'from motes.cli import main; main()' new --help >&-"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+MISTAKES = (
+    ("x = 1\ny = 1 / 0", "2: ZeroDivisionError: division by zero"),
+    ("x = (", "1: SyntaxError: '(' was never closed"),
+)
+
+
+@pytest.mark.parametrize(("text", "line"), MISTAKES)
+def test_a_mistake_in_a_file_of_components_is_one_line(
+    text: str, line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(text)
+    assert outcome("show", "--components", str(path)) == 2
+    assert capsys.readouterr().err == f"{path}:{line}\n"
+    assert outcome("show", "--components", str(tmp_path / "yours.py")) == 74
+    assert capsys.readouterr().err.endswith("yours.py: there is no such file.\n")
 
 
 def test_completion_offers_commands() -> None:

@@ -200,3 +200,42 @@ def test_captures_are_told(tmp_path: Path) -> None:
     for part in ("1-6", "7-12"):
         run("run", "hunt.toml", "-o", "parts", "--no-film", "--frames", part, cwd=tmp_path)
     assert json.loads(run("info", "parts", "--json", cwd=tmp_path).stdout)["captures"] == told
+
+
+BUMP = """
+import motes
+from motes.kernel import kernel
+
+@motes.component(kind="solid", name="bump")
+class Bump:
+    \'\'\'A ball.\'\'\'
+
+    radius: motes.Number = motes.quantity(0.5, "m")
+
+    @kernel
+    def distance(p, x, y, z):
+        return (x * x + y * y + z * z) ** 0.5 - p.radius
+"""
+
+
+def test_a_solid_of_somebodys_own_file_is_drawn_only_where_the_file_is_named(
+    scene: Path, tmp_path: Path
+) -> None:
+    """Frames name the file that declares what they need; it is run where the user says so."""
+    script = tmp_path / "bump.py"
+    script.write_text(BUMP)
+    with scene.open("a") as file:
+        file.write('\n[[solid]]\ntype = "bump"\n')
+    quick = ("--frames", "1-2", "--size", "32x18", "-q")
+    assert 'no solid "bump"' in run("check", scene, cwd=tmp_path).stderr
+    made = run("run", scene, "-o", "out", *quick, "--components", "bump.py", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    refused = run("render", "out", "-q", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert refused.stderr == (
+        f'the solid "bump" was declared in {script}. Add --components {script}, which runs that '
+        "file, or call motes.redraw in it.\n"
+    )
+    assert str(script) in run("info", "out", cwd=tmp_path).stdout
+    drawn = run("render", "out", "-q", "--components", "bump.py", cwd=tmp_path)
+    assert drawn.returncode == 0, drawn.stderr

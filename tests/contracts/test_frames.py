@@ -9,7 +9,9 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -152,6 +154,53 @@ def test_the_same_digest_goes_on_and_another_begins_anew(tmp_path: Path) -> None
     assert FrameStore.create(tmp_path, MANIFEST).numbers() == [1]
     other = Manifest("jet", {"title": "Jet"}, "d2", 24.0, "0.1.0")
     assert FrameStore.create(tmp_path, other).numbers() == []
+
+
+def test_runs_of_two_scenes_in_one_folder_are_noticed(tmp_path: Path) -> None:
+    """The one that began first ends; a frame that it still wrote is not taken for the other's."""
+    first = FrameStore.create(tmp_path, MANIFEST)
+    first.write(jet(1))
+    other = replace(MANIFEST, digest="d2")
+    second = FrameStore.create(tmp_path, other)
+    with pytest.raises(OutputError, match="taken by a run of another scene"):
+        first.write(jet(2))
+    second.path(2).write_bytes(b"".join(encode(jet(2), MANIFEST.digest)))
+    with pytest.raises(OutputError, match=r"00002\.frame belongs to another film"):
+        second.read(2)
+    assert list(second.faults()) == [2]
+
+
+def test_faults_name_the_frames_that_are_damaged(tmp_path: Path) -> None:
+    """Lengths show at once; a flipped bit shows where the frame is read whole."""
+    store = FrameStore.create(tmp_path, MANIFEST)
+    for index in (1, 2, 3, 4):
+        store.write(jet(index))
+    assert store.faults(whole=True) == {}
+    cut, flipped = store.path(2), bytearray(store.path(3).read_bytes())
+    cut.write_bytes(cut.read_bytes()[:-7])
+    flipped[-5] ^= 1
+    store.path(3).write_bytes(flipped)
+    store.path(4).unlink()
+    store.path(4).mkdir()
+    assert {n: text.split(":")[0] for n, text in store.faults().items()} == {
+        2: f"{cut} is damaged", 4: f"cannot read {store.path(4)}",
+    }  # fmt: skip
+    assert "7 bytes are missing at its end" in store.faults()[2]
+    assert list(store.faults(whole=True)) == [2, 3, 4]
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"name": "../jet"}, {"name": ""}, {"name": 3}, {"scene": []}, {"fps": "24"}, {"fps": 0.0},
+        {"digest": 1}, {"scripts": {"solid/bump": 3}}, {"scripts": 7},
+    ],
+)  # fmt: skip
+def test_a_manifest_with_a_foreign_field_is_refused(tmp_path: Path, fields: Any) -> None:
+    path = FrameStore.create(tmp_path, MANIFEST).folder / "manifest.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), **fields}))
+    with pytest.raises(OutputError, match="is not a manifest of kept frames"):
+        FrameStore.open(tmp_path)
 
 
 def test_a_digest_does_not_depend_on_the_order_of_keys() -> None:

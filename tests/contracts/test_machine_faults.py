@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from contextlib import contextmanager
 
 import pytest
 from both_ways import WITH_COMPILER, compiled
 
 import motes.jit
-from motes.errors import SceneError
+from motes.errors import OutputError, SceneError
+from motes.generated import executed
 from motes.jit import jit
 
 pytestmark = WITH_COMPILER
@@ -68,6 +70,19 @@ def test_a_kept_kernel_is_not_compiled_again_and_a_damaged_one_is(tmp_path, monk
     file.write_bytes(file.read_bytes()[:-50])
     assert compiled(half)(7.0) == 3.5
     assert told == ["half", "half"]
+
+
+def test_text_that_cannot_be_kept_runs_all_the_same(tmp_path, monkeypatch):
+    """A cache of somebody else may be read only."""
+
+    @contextmanager
+    def refused(path, **_):
+        raise OutputError(f"cannot write {path}: Permission denied.")
+        yield
+
+    monkeypatch.setenv("MOTES_CACHE", str(tmp_path))
+    monkeypatch.setattr("motes.generated.written_whole", refused)
+    assert executed("answer = 6 * 7\n", {})["answer"] == 42
 
 
 def test_a_film_needs_no_numba(tmp_path):

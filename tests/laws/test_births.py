@@ -222,3 +222,16 @@ def test_frames_go_on_where_a_simulation_is() -> None:
     frames = list(sim.frames())
     assert [frames[0].index, frames[-1].index] == [13, 24]
     assert frames[0].time == 0.5
+
+
+@pytest.mark.parametrize(
+    "many", [{"rate": 1e8}, {"burst": [{"at": 0.005, "count": 10**6}]}], ids=["rate", "burst"]
+)
+def test_births_that_do_not_fit_into_memory_name_their_emitter(
+    many: dict[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The budget is asked before anything is allocated."""
+    sim = simulation([motes.emit.Point(**many)], capacity=10)
+    monkeypatch.setattr("motes.memory._budget", 10**7)
+    with pytest.raises(motes.MemoryBudgetError, match=r'^emitter "s\.point": 1e\+06 births in'):
+        sim.run(steps=1)

@@ -269,7 +269,8 @@ def _load_plugins() -> None:
 def catalog(kind: str) -> dict[str, type[Component]]:
     """All components of a kind by type, in alphabetical order."""
     if kind not in KINDS:
-        raise SceneError(f'no kind "{kind}".{likely(kind, KINDS)} Kinds: {", ".join(KINDS)}.')
+        hint = f"{likely(kind, KINDS)} Kinds: {', '.join(KINDS)}."
+        raise SceneError(f'no kind "{kind}".{hint}', source="")
     _load(kind)
     return dict(sorted(_registry.entries.get(kind, {}).items()))
 
@@ -293,10 +294,13 @@ def attribute(kind: str) -> Callable[[str], type[Component]]:
     """A module `__getattr__` that gives components by class name: `motes.force.Gravity`."""
 
     def lookup(name: str) -> type[Component]:
-        for entry in catalog(kind).values() if not name.startswith("_") else ():
-            if entry.__name__ == name:
-                return entry
-        raise AttributeError(f'no {kind} component "{name}" in the catalog')
+        if name.startswith("_"):
+            raise AttributeError(name)
+        menu = {entry.__name__: entry for entry in catalog(kind).values()}
+        if name not in menu:
+            hint = f"{likely(name, menu)} There are: {', '.join(menu)}."
+            raise AttributeError(f'no {kinds(kind).noun} "{name}" in motes.{kind}.{hint}')
+        return menu[name]
 
     return lookup
 

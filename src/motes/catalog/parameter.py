@@ -80,7 +80,7 @@ class Parameter:
             ("below", self.below),
         )
         stated = [(word, bound) for word, bound in bounds if bound is not None]
-        return " and ".join(f"{word} {bound:g}{unit}" for word, bound in stated)
+        return " and ".join(f"{word} {_shown(bound)}{unit}" for word, bound in stated)
 
     def contains(self, low: float, high: float) -> bool:
         """Whether all values from low to high lie in the allowed range."""
@@ -90,6 +90,11 @@ class Parameter:
             or (self.at_most is not None and high > self.at_most)
             or (self.below is not None and high >= self.below)
         )
+
+
+def _shown(bound: float) -> str:
+    """A bound with six digits; a whole number that a float would round, with all of its own."""
+    return str(bound) if isinstance(bound, int) and float(bound) != bound else f"{bound:g}"
 
 
 def quantity(

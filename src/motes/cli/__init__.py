@@ -95,7 +95,8 @@ def _outcome(arguments: Sequence[str] | None) -> int:
     try:
         given = list(sys.argv[1:] if arguments is None else arguments)
         code = group.main(given, "motes", standalone_mode=False)
-        sys.stdout.flush()
+        if sys.stdout is not None:  # None where it was closed before the start.
+            sys.stdout.flush()
         return code or 0
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())

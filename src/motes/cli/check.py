@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motes.cli.options import complete_scene, json_option
+from motes.cli.options import complete_scene, components_option, json_option
 
 if TYPE_CHECKING:
     import motes
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 @click.argument(
     "scenes", metavar="SCENE...", nargs=-1, required=True, shell_complete=complete_scene
 )
+@components_option
 @json_option
 @click.option("-q", "--quiet", is_flag=True, help="Print mistakes only.")
 @click.pass_context

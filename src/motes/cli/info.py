@@ -18,9 +18,15 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Show what kept frames hold.")
 @click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--check", is_flag=True, help="Read every frame whole, to find damaged ones.")
 @json_option
-def command(folder: Path, as_json: bool) -> None:
-    """Show which frames FOLDER keeps, of which scene, and what is in them."""
+@click.pass_context
+def command(ctx: click.Context, folder: Path, check: bool, as_json: bool) -> None:
+    """Show which frames FOLDER keeps, of which scene, and what is in them.
+
+    Ends with exit code 74 if a frame is damaged.
+    """
+    from motes.errors import OutputError
     from motes.production import open_frames
     from motes.record.energy import to_json
 
@@ -37,9 +43,12 @@ def command(folder: Path, as_json: bool) -> None:
         "count": len(numbers),
         "bytes": store.size(),
         "systems": {},
+        "scripts": dict(manifest.scripts),
     }
-    if numbers:
-        last = store.read(numbers[-1])
+    facts["faults"] = faults = {str(n): text for n, text in store.faults(whole=check).items()}
+    sound = [number for number in numbers if str(number) not in faults]
+    if sound:
+        last = store.read(sound[-1])
         facts["time"] = last.time
         facts["systems"] = {
             name: {key: {"dtype": str(a.dtype), "shape": a.shape} for key, a in columns.items()}
@@ -54,7 +63,7 @@ def command(folder: Path, as_json: bool) -> None:
     facts["captures"] = captures = store.captures()
     if as_json:
         click.echo(json.dumps({**facts, "scene": manifest.scene}, indent=2, ensure_ascii=False))
-        return
+        ctx.exit(OutputError.exit_code if faults else 0)
     rows = [
         ("scene", f"{facts['title'] or manifest.name}"),
         ("version", f"motes {manifest.version}"),
@@ -68,10 +77,15 @@ def command(folder: Path, as_json: bool) -> None:
         begin, end = (f"{captures[k]['time']:.3g} s" for k in (0, -1))
         rows.append(("captures", f"{len(captures)}, the first at {begin}, the last at {end}"))
     for name, columns in facts["systems"].items():
-        rows.append((name, f"{_columns(columns)} in frame {numbers[-1]}"))
+        rows.append((name, f"{_columns(columns)} in frame {sound[-1]}"))
     text = click.HelpFormatter()
     text.write_dl(rows)
     click.echo(text.getvalue().rstrip())
+    for part, script in sorted(manifest.scripts.items()):
+        click.echo(f"{part} was declared in {script or 'a notebook or at a prompt'}")
+    for fault in faults.values():
+        click.echo(fault, err=True)
+    ctx.exit(OutputError.exit_code if faults else 0)
 
 
 def _kept(measures: list[Measures]) -> list[tuple[str, str]]:

@@ -23,7 +23,8 @@ def command(name: str, path: Path | None, force: bool) -> None:
     if target.is_dir():
         target = target / f"{name}.toml"
     if target.suffix.lower() != ".toml":
-        raise click.UsageError(f"{target}: a scene is saved as .toml. Write {target}.toml")
+        toml = target.with_suffix(".toml")
+        raise click.UsageError(f"{target}: a scene is saved as .toml. Write {toml}")
     if target.exists() and not force:
         raise click.UsageError(f"{target} is there already. Add --force to overwrite it.")
     with written_whole(target) as file:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import click
@@ -98,6 +99,22 @@ def film_options(function: Function) -> Function:
     ):  # fmt: skip
         function = option(function)
     return function
+
+
+def components_option(function: Function) -> Function:
+    """--components FILE: a Python file that declares components, which is run."""
+
+    def include_all(_: click.Context, __: click.Parameter, paths: tuple[Path, ...]) -> None:
+        from motes.catalog.scripts import include
+
+        for path in paths:
+            include(path)
+
+    return click.option(
+        "--components", type=click.Path(path_type=Path), multiple=True, metavar="FILE",
+        callback=include_all, expose_value=False,
+        help="Run a Python file whose components the scene uses. May be repeated.",
+    )(function)  # fmt: skip
 
 
 def json_option(function: Function) -> Function:

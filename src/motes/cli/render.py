@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from motes.cli.options import film_options, set_option
+from motes.cli.options import components_option, film_options, set_option
 from motes.cli.progress import shown
 
 
@@ -16,6 +16,7 @@ from motes.cli.progress import shown
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="Folder to write to; else FOLDER."
 )
+@components_option
 @set_option
 @film_options
 def command(

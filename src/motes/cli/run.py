@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from motes.cli.options import film_options, scene_argument, scene_options
+from motes.cli.options import components_option, film_options, scene_argument, scene_options
 from motes.cli.progress import rounded, shown
 
 
@@ -16,6 +16,7 @@ from motes.cli.progress import rounded, shown
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="Folder to write to; else ./NAME."
 )
+@components_option
 @scene_options
 @film_options
 @click.option("--no-film", is_flag=True, help="Only simulate, and keep the frames.")

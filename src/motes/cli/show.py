@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from motes.cli.options import json_option
+from motes.cli.options import components_option, json_option
 
 if TYPE_CHECKING:
     from motes.describe import Entry, Field, Group
@@ -30,6 +30,7 @@ def _complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> li
 @click.command(short_help="List kinds, components and their parameters.")
 @click.argument("kind", required=False, shell_complete=_complete)
 @click.argument("name", required=False, shell_complete=_complete)
+@components_option
 @json_option
 def command(kind: str | None, name: str | None, as_json: bool) -> None:
     """Show what a scene can be made of.

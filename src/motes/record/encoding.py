@@ -2,7 +2,8 @@
 
     8 bytes     magic; its line ends show a transfer in text mode
     4 + 4       length and CRC-32 of the header, little-endian
-    header      JSON: format, index, time, and per column system, name, dtype, shape, bytes, crc32
+    header      JSON: format, index, time, digest of the film, systems, and per column system, name,
+                dtype, shape, bytes, crc32
     columns     in the order of the header
 
 An array is stored with its axes reversed and its bytes shuffled, all first bytes of the elements,
@@ -15,10 +16,12 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import struct
 import sys
 import zlib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.errors import MemoryBudgetError, OutputError
+from motes.files import fault
 from motes.frame import Frame
 
 if sys.version_info >= (3, 14):
@@ -51,8 +55,8 @@ _DAMAGE = (
 """What bytes that encode() has not written can raise on the way to an array."""
 
 
-def encode(frame: Frame) -> Iterator[bytes]:
-    """The bytes of a frame, in pieces.
+def encode(frame: Frame, digest: str = "") -> Iterator[bytes]:
+    """The bytes of a frame, in pieces. `digest` names the film that it belongs to.
 
     Raises:
         TypeError: a column is not an array of numbers.
@@ -81,6 +85,7 @@ def encode(frame: Frame) -> Iterator[bytes]:
             "format": FORMAT,
             "index": frame.index,
             "time": frame.time,
+            "digest": digest,
             "systems": list(frame.systems),
             "columns": entries,
         },
@@ -90,36 +95,74 @@ def encode(frame: Frame) -> Iterator[bytes]:
     yield from bodies
 
 
-def decode(data: bytes, path: Path) -> Frame:
-    """The frame in `data`, the content of `path`.
+def decode(data: bytes, path: Path, digest: str = "") -> Frame:
+    """The frame in `data`, the content of `path`; of the film `digest`, if one is given.
 
     Raises:
-        OutputError: the bytes are not a frame, not a whole one, or of a newer format.
+        OutputError: the bytes are not a frame, not a whole one, of another film or a newer format.
         MemoryBudgetError: the columns do not fit into memory.
     """
-    if not data.startswith(MAGIC):
-        raise OutputError(f"{path} is not a frame of motes.")
-    begin = len(MAGIC) + _LENGTHS.size
-    try:
-        length, checksum = _LENGTHS.unpack_from(data, len(MAGIC))
-        text = data[begin : begin + length]
-        if len(text) < length or zlib.crc32(text) != checksum:
-            raise ValueError("its header is not whole")
-        header = json.loads(text)
-        if header["format"] > FORMAT:
-            raise OutputError(
-                f"{path} has format {header['format']}, and this motes reads up to {FORMAT}. "
-                "A newer motes wrote it; install that."
-            )
+    with _faults(path):
+        header, position = _header(data, path, digest)
         systems: dict[str, dict[str, NDArray[Any]]] = {name: {} for name in header["systems"]}
-        position = begin + length
         for entry in header["columns"]:
             body = data[position : position + entry["bytes"]]
             position += entry["bytes"]
             systems[entry["system"]][entry["name"]] = _column(entry, body)
-        if position != len(data):
-            raise ValueError("it is longer than its header says")
+        _complete(position, len(data))
         return Frame(float(header["time"]), int(header["index"]), systems)
+
+
+def glance(path: Path, digest: str = "") -> None:
+    """Look at a frame's header and length alone; raises OutputError as `decode` does."""
+    with _faults(path):
+        try:
+            with path.open("rb") as file:
+                begin = file.read(len(MAGIC) + _LENGTHS.size)
+                if len(begin) == len(MAGIC) + _LENGTHS.size:
+                    begin += file.read(_LENGTHS.unpack_from(begin, len(MAGIC))[0])
+                size = file.seek(0, os.SEEK_END)
+        except OSError as error:
+            raise fault("read", path, error) from error
+        header, position = _header(begin, path, digest)
+        _complete(position + sum(entry["bytes"] for entry in header["columns"]), size)
+
+
+def _header(data: bytes, path: Path, digest: str) -> tuple[dict[str, Any], int]:
+    """The header of a frame, and where its columns begin."""
+    if not data.startswith(MAGIC):
+        raise OutputError(f"{path} is not a frame of motes.")
+    length, checksum = _LENGTHS.unpack_from(data, len(MAGIC))
+    begin = len(MAGIC) + _LENGTHS.size
+    text = data[begin : begin + length]
+    if len(text) < length or zlib.crc32(text) != checksum:
+        raise ValueError("its header is not whole")
+    header: dict[str, Any] = json.loads(text)
+    if header["format"] > FORMAT:
+        raise OutputError(
+            f"{path} has format {header['format']}, and this motes reads up to {FORMAT}. "
+            "A newer motes wrote it; install that."
+        )
+    if digest and header.get("digest", digest) != digest:
+        raise OutputError(
+            f"{path} belongs to another film: two runs have written into this folder. "
+            "Give each a folder of its own, and run the scene again."
+        )
+    return header, begin + length
+
+
+def _complete(expected: int, size: int) -> None:
+    if expected > size:
+        raise ValueError(f"{expected - size} bytes are missing at its end")
+    if expected < size:
+        raise ValueError("it is longer than its header says")
+
+
+@contextmanager
+def _faults(path: Path) -> Iterator[None]:
+    """What damaged bytes raise within the block, in one line that names the file."""
+    try:
+        yield
     except MemoryError as error:
         raise MemoryBudgetError(f"{path} does not fit into memory.") from error
     except _DAMAGE as error:

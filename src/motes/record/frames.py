@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from motes.errors import OutputError
 from motes.files import content, fault, sweep, written_whole
 from motes.frame import Frame
-from motes.record.encoding import decode, encode
+from motes.record.encoding import decode, encode, glance
 from motes.record.energy import Measures, from_json, to_json
 
 FORMAT = 1
@@ -48,6 +49,27 @@ class Manifest:
 
     version: str
     """The version of motes that simulated."""
+
+    scripts: Mapping[str, str] = field(default_factory=dict)
+    """Files of the components that do not come with motes, by kind and type: "solid/bump"."""
+
+    def __post_init__(self) -> None:
+        """A manifest may come from anybody: its name becomes the name of files.
+
+        Raises:
+            ValueError: a field is not what it should be.
+        """
+        texts = (self.name, self.digest, self.version, *self.scripts, *self.scripts.values())
+        if not all(isinstance(text, str) for text in texts):
+            raise ValueError("a text is something else")
+        if (
+            not self.name
+            or Path(self.name).name != self.name
+            or set(self.name) & set('\\/:*?"<>|\0')
+        ):
+            raise ValueError(f'"{self.name}" is no name of a file')
+        if not isinstance(self.scene, Mapping) or not 0 < self.fps < math.inf:
+            raise ValueError("the scene or its fps is something else")
 
 
 @dataclass(frozen=True)
@@ -140,12 +162,17 @@ class FrameStore:
         """Keep a frame, and give its file.
 
         Raises:
-            OutputError: the file cannot be written.
+            OutputError: the file cannot be written, or another run has begun in the folder.
             TypeError: a column is not an array of numbers.
         """
         path = self.path(frame.index)
+        if not self._same(self.folder / MANIFEST):
+            raise OutputError(
+                f"{self.folder} was removed, or taken by a run of another scene. "
+                "Give each run a folder of its own."
+            )
         with written_whole(path) as file:
-            for part in encode(frame):
+            for part in encode(frame, self.manifest.digest):
                 file.write(part)
         return path
 
@@ -153,13 +180,27 @@ class FrameStore:
         """One frame as it was written, bit for bit.
 
         Raises:
-            OutputError: the frame is not there, damaged, or written by a newer motes.
+            OutputError: the frame is not there, damaged, of another film, or written by a newer
+                motes.
         """
         path = self.path(number)
-        frame = decode(content(path), path)
+        frame = decode(content(path), path, self.manifest.digest)
         if frame.index != number:
             raise OutputError(f"{path} is damaged: it holds frame {frame.index}.")
         return frame
+
+    def faults(self, *, whole: bool = False) -> dict[int, str]:
+        """What is wrong with frames, by number: their lengths, or their `whole` content."""
+        found: dict[int, str] = {}
+        for number in self.numbers():
+            try:
+                if whole:
+                    self.read(number)
+                else:
+                    glance(self.path(number), self.manifest.digest)
+            except OutputError as error:
+                found[number] = str(error)
+        return found
 
     def note(self, number: int, measures: Measures, captures: NDArray[Any] | None = None) -> None:
         """Keep energy, momentum and the rest beside a frame, and captures since the frame before.

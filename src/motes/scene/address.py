@@ -123,9 +123,25 @@ def _unclear(address: str, found: list[Place], menu: list[Place]) -> str:
         return f'"{address}" stands for several values: {shown}{more}. Write one of them.'
     last = address.split(".")[-1]
     ends = [place.address for place in menu if place.words[-1] == last]
-    hint = likely(address, ends) or likely(address, chain(*(place.spellings() for place in menu)))
+    spelt = list(chain(*(place.spellings() for place in menu)))
+    hint = likely(address, [one for one in spelt if one.split(".")[-1] == last]) or likely(
+        address, spelt
+    )
     shown = f" It could be: {', '.join(ends[:MOST_SHOWN])}." if ends and not hint else ""
-    return f'no value has the address "{address}".{hint}{shown} `Scene.addresses` lists them.'
+    return f'no value has the address "{address}".{hint}{shown or _choice(address, menu)}'
+
+
+def _choice(address: str, menu: list[Place]) -> str:
+    """What there is where an address leaves those of the scene: ` sparks.emit has rate, ...`."""
+    words = address.split(".")
+    for length in range(len(words), 0, -1):
+        inside = [place for place in menu if list(place.words[:length]) == words[:length]]
+        if inside:
+            names = [place.words[min(length, len(place.words) - 1)] for place in inside]
+            if len(set(names)) == 1:
+                names = [place.words[-1] for place in inside]
+            return f" {'.'.join(words[:length])} has {', '.join(dict.fromkeys(names))}."
+    return f" There are: {', '.join(dict.fromkeys(place.words[0] for place in menu))}."
 
 
 def _put(document: dict[str, Any], path: tuple[str | int, ...], value: Any) -> None:

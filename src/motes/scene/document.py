@@ -262,6 +262,14 @@ class Scene(Section):
         return json_text(self.document())
 
 
+def a_scene(scene: Scene) -> Scene:
+    """The scene itself; TypeError with the likely fix for what is none, such as its name."""
+    if hasattr(scene, "document"):
+        return scene
+    fix = f' Write motes.load("{scene}").' if isinstance(scene, str) else ""
+    raise TypeError(f"a Scene is needed, not {type(scene).__name__}.{fix}")
+
+
 def _lists(owner: Section, lists: tuple[str, ...]) -> dict[str, Any]:
     """The components of an owner as entries, without empty lists."""
     found = {key: [part.document() for part in getattr(owner, key)] for key in lists}

@@ -31,6 +31,8 @@ def gallery_text(name: str) -> str:
 
 def unknown(name: str, what: str) -> SceneError:
     """The error for a scene that is not there."""
+    if Path(name).exists():
+        what = "a folder, not a scene:" if Path(name).is_dir() else "not a file that holds a scene:"
     names = _names()
     hint = likely(Path(name).stem, names)
     menu = f"The gallery has: {', '.join(names)}. A file of your own ends in .toml or .json."

@@ -21,6 +21,11 @@ Format = Literal["toml", "json"]
 
 _AT = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
+_HALF = re.compile(
+    r"\\u[dD][89abAB][0-9a-fA-F]{2}(?!\\u[dD][c-fC-F])|(?<!\\u[dD][89abAB]..)\\u[dD][c-fC-F]"
+)
+"""An escape of half a surrogate pair without the other half."""
+
 _CLEARER = {
     "Invalid value": 'a value must be a number, true, false, a "text" in quotes, [a, list] or '
     "{ a = table }",
@@ -122,7 +127,9 @@ def _json(text: str, source: str) -> dict[str, Any]:
             json.dumps(document, ensure_ascii=False).encode()
         except UnicodeError:
             message = "half of a surrogate pair, \\ud800 to \\udfff, is no character."
-            raise SceneError([Problem((), message)], source) from None
+            half = _HALF.search(text)
+            line = text.count("\n", 0, half.start()) + 1 if half else None
+            raise SceneError([Problem((), message, line)], source) from None
     if not isinstance(document, dict):
         message = 'a scene must be an object { "title": ..., "system": [...] }.'
         raise SceneError([Problem((), message, 1)], source)

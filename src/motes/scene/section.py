@@ -128,7 +128,9 @@ def collected(model: type[Section], values: Mapping[str, Any], source: str) -> I
     try:
         yield
     except ValidationError as error:
-        problems += [_problem(details, model, values) for details in error.errors()]
+        known = {problem.path for problem in problems}
+        found = [_problem(details, model, values) for details in error.errors()]
+        problems += [problem for problem in found if problem.path not in known]
     if problems:
         raise SceneError(problems, source)
 
