@@ -151,8 +151,10 @@ def damped_time(rate: Any, h: Any) -> Any:
 
     Error below 3 ULP.
     """
-    z, inverse = rate * h, ONE / rate  # The division is done beside the exponential, not after it.
-    return h if abs(z) < LINEAR else one_minus_exp(z) * inverse
+    z = rate * h
+    linear = abs(z) < LINEAR
+    inverse = ONE / (ONE if linear else rate)  # Beside the exponential, not after it.
+    return h if linear else one_minus_exp(z) * inverse
 
 
 def phi1(z: Any) -> Any:
