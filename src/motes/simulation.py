@@ -19,7 +19,7 @@ from motes.diagnose import explain_infinity
 from motes.emission import Clock
 from motes.errors import SceneError, SimulationError, likely
 from motes.frame import Frame
-from motes.group import Group, named_systems
+from motes.group import Group, joined, linked
 from motes.group.capture import CAPTURE
 from motes.group.glide import TOGETHER as GLIDE
 from motes.group.lasting import Lasting
@@ -116,18 +116,7 @@ class Simulation:
 
     def _grouped(self) -> list[Group]:
         """Groups of systems that interact, directly or through others."""
-        links = [named_systems(part) or set(self._steppers) for part in self.scene.interact]
-        for part, link in zip(self.scene.interact, links, strict=True):
-            for name in sorted(link - set(self._steppers)):
-                raise SceneError(
-                    f'interaction "{part.name}": no system "{name}".'
-                    f"{likely(name, self._steppers)} There are: {', '.join(self._steppers)}."
-                )
-        groups: list[set[str]] = []
-        for link in links:
-            touching = [group for group in groups if group & link]
-            groups = [group for group in groups if not group & link]
-            groups.append(link.union(*touching))
+        links = linked(self.scene.interact, list(self._steppers))
         return [
             Group(
                 {name: self._steppers[name] for name in sorted(group)},
@@ -141,7 +130,7 @@ class Simulation:
                 self._periodic,
                 tuple((component_address(None, part), part) for part in self.scene.solid),
             )
-            for group in groups
+            for group in joined(links)
         ]
 
     @property

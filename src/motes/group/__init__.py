@@ -8,6 +8,6 @@ lists); `constrain` holds laws of velocities (crowds), `capture` who catches who
 
 from motes.group.group import Group
 from motes.group.members import Bodies, Movers, Occasion
-from motes.group.partners import named_systems
+from motes.group.partners import joined, linked
 
-__all__ = ["Bodies", "Group", "Movers", "Occasion", "named_systems"]
+__all__ = ["Bodies", "Group", "Movers", "Occasion", "joined", "linked"]

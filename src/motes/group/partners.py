@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -24,6 +24,31 @@ def named_systems(interaction: Component) -> set[str]:
     others = (interaction.values[key].document() for key in ("sources", "hunters")
               if key in interaction.values)  # fmt: skip
     return named.union(*others) if named else named
+
+
+def linked(interactions: Sequence[Component], names: Sequence[str]) -> list[set[str]]:
+    """The systems that each interaction links, out of all that there are.
+
+    Raises SceneError for one that there is not.
+    """
+    links = [named_systems(part) or set(names) for part in interactions]
+    for part, link in zip(interactions, links, strict=True):
+        for name in sorted(link - set(names)):
+            raise SceneError(
+                f'interaction "{part.name}": no system "{name}".'
+                f"{likely(name, names)} There are: {', '.join(names)}."
+            )
+    return links
+
+
+def joined(links: Sequence[set[str]]) -> list[set[str]]:
+    """Groups of all that links join, directly or through others."""
+    groups: list[set[str]] = []
+    for link in links:
+        touching = [group for group in groups if group & link]
+        groups = [group for group in groups if not group & link]
+        groups.append(link.union(*touching))
+    return groups
 
 
 def kernel(interaction: Component, name: str) -> Callable[..., Any]:
