@@ -47,21 +47,17 @@ ENOUGH = 5.0
 EASIER = 8.0
 """How many times less an expansion of the lower order may neglect: there are many of them."""
 
-FAR = 0.5
-"""Part of what may be at which one tries again; from there on what is left is used up untried, as
-the error grows at most in proportion."""
-
 TRIALS = 8
 """Trials before all is summed by pairs."""
 
 TASKS, FEWEST_TASKS, PARTICLES_OF_A_TASK = 128, 8, 2048
 """Parts of the walk; each of the threads takes one after the other. A part costs 0.1 ms more."""
 
-STRICTER, STRICTEST, LOW_ORDER = 6.0, 100.0, 5
+STRICTER, STRICTEST, LOW_ORDER = 10.0, 100.0, 5
 """How much less the walk that the sample is compared with may neglect, and how much below an order:
 there errors fall slowly, as many are alike."""
 
-HIGHEST = {True: 11, False: 8}
+HIGHEST = {True: 12, False: 8}
 """Highest order of harmonic expansions and of others: more would not be faster."""
 
 
@@ -85,9 +81,9 @@ def plan(tolerance: float, law: str) -> Plan:
     """Order, leaf size and precision that are fast at a tolerance, found by measurement."""
     digits = -math.log10(tolerance)
     real = np.float32 if tolerance >= SINGLE_FROM else np.float64
-    order = min(max(2, int(2 * digits - 0.99)), HIGHEST[law != "plummer"])
-    leaf = 48 if digits > 4.2 and real is np.float32 else 28
-    return Plan(order, max(int(0.72 * order), 1), leaf, real)
+    order = min(max(2, int(1.3 * digits + 1.5)), HIGHEST[law != "plummer"])
+    leaf = 32 if digits < 4 else 48
+    return Plan(order, max(order - 2, 1), leaf, real)
 
 
 def multipole(
@@ -189,10 +185,9 @@ class Problem:
                 exact = self._at(sample, strict)
             part = self._error(sample, self._at(sample, limits), exact) / (SAFETY * tolerance)
             if part <= 1.0:
-                more = min(1 / max(part, FAR), MOST * tolerance / share)
-                kept = limits._replace(error=more * limits.error)
-                if part > FAR or share >= MOST * tolerance:
-                    return kept
+                if kept is not None or part > 0.7 or share >= MOST * tolerance:
+                    return limits
+                kept = limits
             elif kept is not None:
                 return kept
             share *= min(max(0.9 / max(part, 1e-9), 0.05), 3.0)
