@@ -57,6 +57,9 @@ STRICTER, STRICTEST, LOW_ORDER = 10.0, 100.0, 5
 """How much less the walk that the sample is compared with may neglect, and how much below an order:
 there errors fall slowly, as many are alike."""
 
+FEW_PAIRS = 1 << 22
+"""Pairs of the sample's targets with all sources up to which it is compared with their sum."""
+
 HIGHEST = {True: 12, False: 8}
 """Highest order of harmonic expansions and of others: more would not be faster."""
 
@@ -171,6 +174,9 @@ class Problem:
         rounding = tolerance * scale
         stricter = STRICTER if self.plan.order >= LOW_ORDER else STRICTEST
         share, strictest = tolerance * FIRST, math.inf
+        if len(sample.rows) * self.sources.place.shape[1] <= FEW_PAIRS:
+            strictest = 0.0
+            exact = self._at(sample, self.limits(0.0, 0.0, rounding / stricter))
         kept = None
         for _ in range(TRIALS):
             limits = self.limits(share * scale, MOMENTUM * tolerance * force, rounding)

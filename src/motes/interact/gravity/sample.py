@@ -15,8 +15,12 @@ from motes.interact.gravity.tree import END, RADIUS, START, Tree
 LEAVES = 16
 """Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
-LEAVES_OF_A_CLASS = 8
-"""Target leaves out of each further class, which has twice as many as the one before."""
+LEAVES_OF_A_CLASS = 6
+"""Fewest target leaves out of each further class, which has twice as many as the one before."""
+
+LEAVES_BY_SHARE = 48
+"""More target leaves, out of each class as many as is its share of the targets: where most are, a
+few leaves would leave the mean uncertain."""
 
 DEVIATIONS = 2.5
 """Standard errors of a mean square by which it may be larger than the sample says."""
@@ -81,17 +85,18 @@ def sample_of(tree: Tree) -> Sample:
 
     Those chosen from a class are far from each other along the tree's curve.
     """
-    leaves, cells = tree.leaves, tree.cells
+    leaves, cells, targets = tree.leaves, tree.cells, tree.place.shape[1]
     borders = [LEAVES << k for k in range(32) if LEAVES << k < len(leaves)]
     if borders:
         leaves = leaves[np.argpartition(-tree.bodies[leaves, RADIUS], borders)]
     chosen, weights, chances = [], [], []
     for first, last in zip([0, *borders], [*borders, len(leaves)], strict=True):
         some = np.sort(leaves[first:last])
-        number = min(LEAVES_OF_A_CLASS if first else LEAVES, len(some))
+        every = int((cells[some, END] - cells[some, START]).sum())
+        number = LEAVES_OF_A_CLASS if first else LEAVES
+        number = min(max(number, LEAVES_BY_SHARE * every // targets), len(some))
         picked = some[(np.arange(number) * 2 + 1) * len(some) // (2 * number)]
         counts = cells[picked, END] - cells[picked, START]
-        every = int((cells[some, END] - cells[some, START]).sum())
         chosen.append(picked)
         weights.append(np.repeat(every / counts.sum(), counts.sum()))
         chances.append(1 - number / len(some))
