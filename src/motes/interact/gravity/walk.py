@@ -57,13 +57,26 @@ def _expander(operations: Translations) -> Callable[..., None]:
     return expand  # type: ignore[no-any-return]
 
 
+@jit(inline=True)
+def _is_wanted(ranges: Any, start: Any, end: Any) -> Any:
+    """Whether a cell has particles in one of the ranges, which ascend."""
+    low, high = 0, ranges.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if ranges[middle, 1] <= start:
+            low = middle + 1
+        else:
+            high = middle
+    return low < ranges.shape[0] and ranges[low, 0] < end
+
+
 @cache
 def walker(law: str, real: type, potential: bool, order: int, low_order: int) -> Callable[..., Any]:
     """Compiled walk for a pair law, numbers of type `real`, with or without the potential.
 
     (targets, sources, same, ranges, limits, desk, out) -> int: writes to rows 0 to 2 of `out`
     (4, n) the sums of m s dx, and with `potential` to row 3 those of m w, for the particles of
-    `targets` in `ranges` (k, 2), first and last + 1, which are whole cells. Returns 0, or 1 if the
+    `targets` in `ranges` (k, 2), first and last + 1, which are whole cells and ascend. Returns 0, or 1 if the
     lists of candidates need more room. `same`: the two trees are one, and a particle is among its
     own sources. Source cells whose expansion of order `low_order` is enough are taken with that.
     """
@@ -163,14 +176,14 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
 
     @jit(flags=EXACT, numba=False)
     def wait(
-        targets: Tree, cell: Any, begin: Any, end: Any, low: Any, high: Any, depth: Any, desk: Desk
+        targets: Tree, cell: Any, ranges: Any, low: Any, high: Any, depth: Any, desk: Desk
     ) -> Any:
-        """Put a cell's children that own targets from `begin` to `end` on the stack."""
+        """Put a cell's children that own targets in `ranges` on the stack."""
         place, cells, bodies = desk.place, targets.cells, targets.bodies
         scale = 1.0 / cell_unit(bodies[cell, RADIUS])
         lane = 0
         for child in range(cells[cell, FIRST], cells[cell, FIRST] + cells[cell, NUMBER]):
-            if cells[child, START] < end and cells[child, END] > begin:
+            if _is_wanted(ranges, cells[child, START], cells[child, END]):
                 place[0, lane] = (bodies[child, X] - bodies[cell, X]) * scale
                 place[1, lane] = (bodies[child, Y] - bodies[cell, Y]) * scale
                 place[2, lane] = (bodies[child, Z] - bodies[cell, Z]) * scale
@@ -203,31 +216,29 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
         targets: Tree, sources: Tree, same: Any, ranges: Any, limits: Limits, desk: Desk, out: Any
     ) -> Any:
         total, waiting = desk.total, desk.waiting
-        for some in range(ranges.shape[0]):
-            begin, end = ranges[some, 0], ranges[some, 1]
-            desk.local[0] = 0
-            desk.candidates[0] = 0
-            waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, 0, 1
-            depth = 1
-            while depth > 0:
-                depth -= 1
-                cell, low, high = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2]
-                top = gather(targets, sources, cell, low, high, limits, desk)
-                if top < 0:
-                    return 1
-                lanes_to_local(desk.gathered, desk.local[depth])
-                if targets.cells[cell, NUMBER] > 0:
-                    depth = wait(targets, cell, begin, end, high, top, depth, desk)
-                    continue
-                finish(targets, cell, desk.local[depth], desk)
-                sum_near(targets, sources, same, cell, high, top, limits, desk)
-                start = targets.cells[cell, START]
-                for i in range(targets.cells[cell, END] - start):
-                    out[0, start + i] = total[0, i]
-                    out[1, start + i] = total[1, i]
-                    out[2, start + i] = total[2, i]
-                    if potential:
-                        out[3, start + i] = total[4, i]
+        desk.local[0] = 0
+        desk.candidates[0] = 0
+        waiting[0, 0], waiting[0, 1], waiting[0, 2] = 0, 0, 1
+        depth = 1
+        while depth > 0:
+            depth -= 1
+            cell, low, high = waiting[depth, 0], waiting[depth, 1], waiting[depth, 2]
+            top = gather(targets, sources, cell, low, high, limits, desk)
+            if top < 0:
+                return 1
+            lanes_to_local(desk.gathered, desk.local[depth])
+            if targets.cells[cell, NUMBER] > 0:
+                depth = wait(targets, cell, ranges, high, top, depth, desk)
+                continue
+            finish(targets, cell, desk.local[depth], desk)
+            sum_near(targets, sources, same, cell, high, top, limits, desk)
+            start = targets.cells[cell, START]
+            for i in range(targets.cells[cell, END] - start):
+                out[0, start + i] = total[0, i]
+                out[1, start + i] = total[1, i]
+                out[2, start + i] = total[2, i]
+                if potential:
+                    out[3, start + i] = total[4, i]
         return 0
 
     return walk  # type: ignore[no-any-return]
