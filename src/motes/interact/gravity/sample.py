@@ -15,10 +15,10 @@ from motes.interact.gravity.tree import END, RADIUS, START, Tree
 LEAVES = 16
 """Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
-LEAVES_OF_A_CLASS = 6
+LEAVES_OF_A_CLASS = 4
 """Fewest target leaves out of each further class, which has twice as many as the one before."""
 
-LEAVES_BY_SHARE = 48
+LEAVES_BY_SHARE = 32
 """More target leaves, out of each class as many as is its share of the targets: where most are, a
 few leaves would leave the mean uncertain."""
 
