@@ -56,6 +56,8 @@ class Desk(NamedTuple):
     """(2, 3 lanes) source cells whose expansions are to be used, in full and of the lower order."""
     candidates: NDArray[np.int32]
     """Source cells that are left for a target cell's children, lists of all levels end to end."""
+    reaches: NDArray[np.float64]
+    """How far each of the last list, of a leaf, reaches from its center."""
     waiting: NDArray[np.int32]
     """(stack, 3) target cells, and where the lists that they inherit begin and end."""
     opened: NDArray[np.int32]
@@ -91,6 +93,7 @@ def desk(operations: Translations, harmonic: bool, real: type, largest: int, cap
         ascending=np.arange(LANES, dtype=np.int32),
         far=np.zeros((2, 3 * LANES), np.int32),
         candidates=np.empty(capacity, np.int32),
+        reaches=np.empty(capacity),
         waiting=np.empty((_STACK, 3), np.int32),
         opened=np.zeros(_STACK, np.int32),
         local=np.zeros((_STACK, padded(operations.basis)), real),

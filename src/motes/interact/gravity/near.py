@@ -118,24 +118,25 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
                 write(target[axis], i, read(targets.near[axis], start + i))
         # Rounding is in proportion to the largest coordinate of what is summed together, and large
         # leaves around a small one would make it large for all: they are summed apart.
-        least = 1e300
+        least, reaches = 1e300, desk.reaches
         for k in range(low, high):
             leaf = desk.candidates[k]
+            reach = reach_of(bodies[leaf], x, y, z)
+            reaches[k - low] = reach
             if not (same and leaf == cell):
-                least = min(least, reach_of(bodies[leaf], x, y, z))
+                least = min(least, reach)
         border = WIDER * max(radius, least) if single else 1e300
         for wide in range(2):
             packed = pieces = 0
             distance, own = radius, (0, 0, 0)
             left = False
             for k in range(low, high):
-                leaf = desk.candidates[k]
-                first, last = cells[leaf, START], cells[leaf, END]
-                itself = same and leaf == cell
-                reach = reach_of(bodies[leaf], x, y, z)
+                leaf, reach = desk.candidates[k], reaches[k - low]
                 if (reach > border) != (wide == 1):
                     left = True
                     continue
+                first, last = cells[leaf, START], cells[leaf, END]
+                itself = same and leaf == cell
                 if itself and radius == 0.0:
                     if potential and depth > 0.0:
                         for i in range(count):

@@ -76,9 +76,10 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
 
     (targets, sources, same, ranges, limits, desk, out) -> int: writes to rows 0 to 2 of `out`
     (4, n) the sums of m s dx, and with `potential` to row 3 those of m w, for the particles of
-    `targets` in `ranges` (k, 2), first and last + 1, which are whole cells and ascend. Returns 0, or 1 if the
-    lists of candidates need more room. `same`: the two trees are one, and a particle is among its
-    own sources. Source cells whose expansion of order `low_order` is enough are taken with that.
+    `targets` in `ranges` (k, 2), first and last + 1, which are whole cells and ascend. Returns 0,
+    or 1 if the lists of candidates need more room. `same`: the two trees are one, and a particle is
+    among its own sources. Source cells whose expansion of order `low_order` is enough are taken
+    with that.
     """
     sum_near = near_field(law, real, potential)
     harmonic = law != "plummer"
