@@ -41,6 +41,10 @@ TASKS = 64
 NOTHING = (8.0, 8.0, 8.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 """A ball without mass, outside of the box: what lanes that are left over are about."""
 
+MANY = 500
+"""Most particles of a cell with children whose ball is the smallest around its center of mass. A
+larger one follows from its children's balls: it may be too large, which makes errors smaller."""
+
 LIGHT = 1e-30
 """Weight of massless particles in a center, where the masses of all are about 1."""
 
@@ -83,22 +87,31 @@ def _measurer(order: int) -> Callable[..., None]:
                 z += m * bodies[child, Z]
         weights += mass
         x, y, z = x / weights, y / weights, z / weights
-        xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
-        ms = place[3, start:end]
-        whole = xs.size // LANES * LANES
-        far, sums, r2, spread_out = spread(0.0), spread(0.0), 0.0, 0.0
-        for i in range(0, whole, LANES):
-            dx, dy, dz = read(xs, i) - x, read(ys, i) - y, read(zs, i) - z
-            s2 = dx * dx + dy * dy + dz * dz
-            far = maximum(s2, far)
-            sums = sums + read(ms, i) * raised(s2)
-        for i in range(whole, xs.size):
-            dx, dy, dz = xs[i] - x, ys[i] - y, zs[i] - z
-            s2 = dx * dx + dy * dy + dz * dz
-            r2 = max(r2, s2)
-            spread_out += ms[i] * raised(s2)
-        radius = np.sqrt(max(r2, largest(far)))
-        spread_out += total(sums)
+        r2, radius, spread_out = 0.0, 0.0, 0.0
+        if number == 0 or end - start <= MANY:
+            xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
+            ms = place[3, start:end]
+            whole = xs.size // LANES * LANES
+            far, sums = spread(0.0), spread(0.0)
+            for i in range(0, whole, LANES):
+                dx, dy, dz = read(xs, i) - x, read(ys, i) - y, read(zs, i) - z
+                s2 = dx * dx + dy * dy + dz * dz
+                far = maximum(s2, far)
+                sums = sums + read(ms, i) * raised(s2)
+            for i in range(whole, xs.size):
+                dx, dy, dz = xs[i] - x, ys[i] - y, zs[i] - z
+                s2 = dx * dx + dy * dy + dz * dz
+                r2 = max(r2, s2)
+                spread_out += ms[i] * raised(s2)
+            radius = np.sqrt(max(r2, largest(far)))
+            spread_out += total(sums)
+        else:
+            for child in range(first_child, first_child + number):
+                dx, dy, dz = bodies[child, X] - x, bodies[child, Y] - y, bodies[child, Z] - z
+                away = np.sqrt(dx * dx + dy * dy + dz * dz)
+                radius = max(radius, away + bodies[child, RADIUS])
+                at_most = away + tree.balls[child, SPREAD]
+                spread_out += bodies[child, MASS] * raised(at_most * at_most)
         bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
         bodies[cell, RADIUS], bodies[cell, MASS] = radius, mass
         ball, content = tree.balls[cell], tree.contents[cell]
