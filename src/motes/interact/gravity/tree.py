@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.interact.gravity.morton import LEVELS, morton_order
-from motes.jit import blocks, jit, share
+from motes.interact.gravity.room import Room
+from motes.jit import each, jit
 
 START, END, FIRST, NUMBER = 0, 1, 2, 3
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
@@ -27,6 +28,10 @@ only, and expansions around its center hardly converge at its edge.
 FINER, LARGER = 1, 3
 """Levels from a usual leaf up to one that is much larger, and on to where each particle is alone:
 the ball around two of these would hold most others."""
+
+BRANCHES, LEAST = 64, 1024
+"""Parts into which particles are divided before the rest is divided in parallel, about, and
+particles of a part at least."""
 
 
 class Tree(NamedTuple):
@@ -80,21 +85,30 @@ def _most(leaf: Any, level: Any, coarse: Any) -> Any:
 
 
 @jit(numba=False)
-def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
-    """Write the rows of all cells; return their number, or 0 if there is no room.
+def _divide(
+    key: Any, leaf: Any, coarse: Any, limit: Any, root: Any, cells: Any, branches: Any
+) -> Any:
+    """Write the rows of a cell `root` (start, end, level) and of what is under it; return their
+    number and that of branches.
 
     Leaves have at most `leaf` particles, or FEW if they fill a cube of a level under `coarse`, or
-    one if it is LARGER levels under that.
+    one if it is LARGER levels under that. Cells of at most `limit` particles are not divided, but
+    written to `branches` (k, 4): their particles START to END, their level and their row.
     """
     stack, cuts = np.empty((8 * LEVELS + 1, 2), np.int64), np.empty(8, np.int64)
-    cells[0, START], cells[0, END] = 0, key.size
-    stack[0] = 0
-    depth, count = 1, 1
+    cells[0, START], cells[0, END] = root[0], root[1]
+    stack[0, 0], stack[0, 1] = 0, root[2]
+    depth, count, found = 1, 1, 0
     while depth > 0:
         depth -= 1
         cell, level = stack[depth]
         start, end = cells[cell, START], cells[cell, END]
         cells[cell, FIRST], cells[cell, NUMBER] = count, 0
+        if end - start <= limit:
+            branch = branches[found]
+            branch[0], branch[1], branch[2], branch[3] = start, end, level, cell
+            found += 1
+            continue
         if end - start == 1 or (end - start <= FEW and level + LARGER >= coarse):
             continue
         shift = np.uint64(3 * (LEVELS - 1 - level))
@@ -103,8 +117,6 @@ def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
             shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
         if level == LEVELS or end - start <= _most(leaf, level, coarse):
             continue
-        if count + 8 > cells.shape[0]:
-            return 0
         # From the last octant to the first.
         most = _most(leaf, level + 1, coarse)
         high, octant, number = end, np.uint64(8), 0
@@ -132,28 +144,64 @@ def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
             stack[depth, 0], stack[depth, 1] = child, level + 1
             depth += 1
         count += number
-    return count
+    return count, found
 
 
 @jit(numba=False)
-def _permute(
-    points: Any, mass: Any, low: Any, length: Any, order: Any, place: Any, first: Any, last: Any
+def _divide_branch(
+    key: Any, leaf: Any, coarse: Any, branches: Any, cells: Any, counts: Any, levels: Any, k: Any
 ) -> None:
-    for i in range(first, last):
-        k = order[i]
-        place[0, i] = (points[k, 0] - low[0]) / length
-        place[1, i] = (points[k, 1] - low[1]) / length
-        place[2, i] = (points[k, 2] - low[2]) / length
-        place[3, i] = mass[k]
+    """Divide a branch, and count particles by the level of the cube around their leaf."""
+    branch = branches[k]
+    own = cells[2 * branch[0] : 2 * branch[1]]
+    counts[k], _ = _divide(key, leaf, coarse, 0, branch, own, branches)
+    levels[k] = 0
+    if coarse == 0:
+        for cell in range(counts[k]):
+            start, end = own[cell, START], own[cell, END]
+            if own[cell, NUMBER] == 0:
+                level, shift = 0, np.uint64(3 * (LEVELS - 1))
+                while level < LEVELS and key[start] >> shift == key[end - 1] >> shift:
+                    level += 1
+                    shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
+                levels[k, level] += end - start
 
 
 @jit(numba=False)
-def unpermute(sums: Any, order: Any, result: Any, first: Any, last: Any) -> None:
-    """Write columns `first` to `last` of sums in the tree's order to rows where they came from."""
-    for i in range(first, last):
-        place = order[i]
-        for row in range(sums.shape[0]):
-            result[place, row] = sums[row, i]
+def _number(stem: Any, branches: Any, parts: Any, counts: Any, cells: Any, after: Any) -> None:
+    """Write the cells of the stem and the branches' own, in depth-first order, and where those
+    under each branch are to be."""
+    # Rows in the stem and in the end.
+    stack = np.empty((8 * LEVELS + 1, 2), np.int64)
+    stack[0] = 0
+    depth, count, branch = 1, 1, 0
+    while depth > 0:
+        depth -= 1
+        old, cell = stack[depth]
+        first, number = stem[old, FIRST], stem[old, NUMBER]
+        cells[cell, START], cells[cell, END] = stem[old, START], stem[old, END]
+        cells[cell, FIRST], cells[cell, NUMBER] = count, number
+        if branch < counts.size and branches[branch, 3] == old:
+            cells[cell, NUMBER] = parts[2 * branches[branch, 0], NUMBER]
+            after[branch] = count
+            count += counts[branch] - 1
+            branch += 1
+            continue
+        for k in range(number):
+            child = number - 1 - k
+            stack[depth, 0], stack[depth, 1] = first + child, count + child
+            depth += 1
+        count += number
+
+
+@jit(numba=False)
+def _move_branch(branches: Any, parts: Any, counts: Any, after: Any, cells: Any, k: Any) -> None:
+    """Write the cells under a branch, which know each other's rows."""
+    start, shift = 2 * branches[k, 0], after[k] - 1
+    for i in range(1, counts[k]):
+        old, new = parts[start + i], cells[shift + i]
+        new[START], new[END], new[NUMBER] = old[START], old[END], old[NUMBER]
+        new[FIRST] = old[FIRST] + shift
 
 
 @jit(inline=True)
@@ -172,28 +220,26 @@ class Box:
     """Edge, not 0."""
     length: float
     """Unit of length of the tree's coordinates, which are from the corner."""
+    mass: float = 1.0
+    """Unit of mass in the tree."""
 
 
-def octree(points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int) -> Tree:
+def octree(
+    points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int, room: Room | None = None
+) -> Tree:
     """Sort and divide particles (n, 3) with masses (n,) until no leaf has more than `leaf`.
 
-    Particles that share a key, closer than 2^-21 of the box, stay in one leaf.
+    Particles that share a key, closer than 2^-21 of the box, stay in one leaf. The pieces "records"
+    and "key" of the room are free again afterwards.
     """
-    key, order = morton_order(points, box.low, box.size)
-    n = len(key)
-    cells = _cells(key, leaf, 0)
-    cells = _cells(key, leaf, _usual_level(key, cells) - FINER)
-    place = np.empty((4, n))
-    ranges = blocks(n, 1 << 16)
-    share(
-        lambda k: _permute(points, mass, box.low, box.length, order, place, *ranges[k]),
-        len(ranges),
-    )
+    room = room or Room()
+    key, order, place = morton_order(points, mass, box.low, box.size, box.length, box.mass, room)
+    cells = _cells(key, leaf, room)
     nothing = np.empty((0, 0))
     return Tree(
         *_leaves(cells),
         cells,
-        np.empty((len(cells), 5)),
+        room.array("bodies", (len(cells), 5)),
         nothing,
         nothing,
         order,
@@ -203,13 +249,39 @@ def octree(points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int)
     )
 
 
-def _cells(key: NDArray[np.uint64], leaf: int, coarse: int) -> NDArray[np.int32]:
-    capacity, count = 64 + 4 * len(key) // leaf, 0
-    while not count:
-        capacity *= 2
-        cells: NDArray[np.int32] = np.empty((capacity, 4), np.int32)
-        count = _divide(key, leaf, coarse, cells)
-    return cells[:count].copy()
+def _cells(key: NDArray[np.uint64], leaf: int, room: Room) -> NDArray[np.int32]:
+    """All cells, divided once to know the usual level of leaves, and again with that."""
+    n = len(key)
+    limit = max(n // BRANCHES, leaf, LEAST)
+    # An inner cell has more particles than one of its children, and at least two of these.
+    parts = room.array("records", (2 * n, 4), np.int32)
+    most = 8 * LEVELS * (n // limit) + 1
+    stem, room_of_branches = np.empty((most, 4), np.int32), np.empty((most, 4), np.int64)
+    root, coarse = np.array([0, n, 0]), 0
+    while True:
+        count, found = _divide(key, leaf, coarse, limit, root, stem, room_of_branches)
+        branches, counts = room_of_branches[:found], np.empty(found, np.int64)
+        levels = np.empty((found, LEVELS + 1), np.int64)
+        each(
+            _divide_branch,
+            (key, leaf, coarse, branches, parts, counts, levels),
+            [(k,) for k in range(found)],
+        )
+        if coarse:
+            break
+        coarse = _usual_level(levels.sum(axis=0)) - FINER
+        if coarse <= 0:
+            break
+    cells: NDArray[np.int32] = room.array("cells", (count + int(counts.sum()) - found, 4), np.int32)
+    after = np.empty(found, np.int64)
+    _number(stem, branches, parts, counts, cells, after)
+    each(_move_branch, (branches, parts, counts, after, cells), [(k,) for k in range(found)])
+    return cells
+
+
+def _usual_level(particles: NDArray[np.int64]) -> int:
+    """Level of the cube around the leaf of the median particle, from how many are at each level."""
+    return int(np.searchsorted(2 * np.cumsum(particles), particles.sum()))
 
 
 def _leaves(cells: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
@@ -228,22 +300,3 @@ def _find_leaves(cells: Any, found: Any) -> Any:
             count += 1
             largest = max(largest, cells[cell, END] - cells[cell, START])
     return count, largest
-
-
-@jit(numba=False)
-def _usual_level(key: Any, cells: Any) -> Any:
-    """Level of the cube around the leaf of the median particle, leaves sorted by that."""
-    particles = np.zeros(LEVELS + 1, np.int64)
-    for cell in range(cells.shape[0]):
-        if cells[cell, NUMBER] == 0:
-            start, end = cells[cell, START], cells[cell, END]
-            level, shift = 0, np.uint64(3 * (LEVELS - 1))
-            while level < LEVELS and key[start] >> shift == key[end - 1] >> shift:
-                level += 1
-                shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
-            particles[level] += end - start
-    level, below = 0, particles[0]
-    while 2 * below < key.size:
-        level += 1
-        below += particles[level]
-    return level
