@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from motes.interact.gravity.morton import LEVELS, morton_order
 from motes.interact.gravity.room import Room
-from motes.jit import each, jit
+from motes.jit import Calls, each, jit
 
 START, END, FIRST, NUMBER = 0, 1, 2, 3
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
@@ -32,6 +32,10 @@ the ball around two of these would hold most others."""
 BRANCHES, LEAST = 64, 1024
 """Parts into which particles are divided before the rest is divided in parallel, about, and
 particles of a part at least."""
+
+WINDOW, WINDOWS = 1024, 128
+"""Particles that are neighbours on the curve, and how many times as many are looked at to know the
+usual level of leaves."""
 
 
 class Tree(NamedTuple):
@@ -149,22 +153,27 @@ def _divide(
 
 @jit(numba=False)
 def _divide_branch(
-    key: Any, leaf: Any, coarse: Any, branches: Any, cells: Any, counts: Any, levels: Any, k: Any
+    key: Any, leaf: Any, coarse: Any, branches: Any, cells: Any, counts: Any, k: Any
 ) -> None:
-    """Divide a branch, and count particles by the level of the cube around their leaf."""
+    """Write the rows of what is in a branch from row 2 START on."""
     branch = branches[k]
     own = cells[2 * branch[0] : 2 * branch[1]]
     counts[k], _ = _divide(key, leaf, coarse, 0, branch, own, branches)
-    levels[k] = 0
-    if coarse == 0:
-        for cell in range(counts[k]):
-            start, end = own[cell, START], own[cell, END]
-            if own[cell, NUMBER] == 0:
-                level, shift = 0, np.uint64(3 * (LEVELS - 1))
-                while level < LEVELS and key[start] >> shift == key[end - 1] >> shift:
-                    level += 1
-                    shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
-                levels[k, level] += end - start
+
+
+@jit(numba=False)
+def _find_levels(key: Any, some: Any, cells: Any, counts: Any, levels: Any, k: Any) -> None:
+    """Count particles by the level of the cube around their leaf, but for leaves that are cut."""
+    first, last = some[k, 0], some[k, 1]
+    for cell in range(2 * first, 2 * first + counts[k]):
+        start, end = cells[cell, START], cells[cell, END]
+        is_whole = (start > first or start == 0) and (end < last or end == key.size)
+        if cells[cell, NUMBER] == 0 and (is_whole or end - start == last - first):
+            level, shift = 0, np.uint64(3 * (LEVELS - 1))
+            while level < LEVELS and key[start] >> shift == key[end - 1] >> shift:
+                level += 1
+                shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
+            levels[k, level] += end - start
 
 
 @jit(numba=False)
@@ -250,38 +259,44 @@ def octree(
 
 
 def _cells(key: NDArray[np.uint64], leaf: int, room: Room) -> NDArray[np.int32]:
-    """All cells, divided once to know the usual level of leaves, and again with that."""
+    """All cells: those above the branches, then what is in each of these, then put together."""
     n = len(key)
     limit = max(n // BRANCHES, leaf, LEAST)
     # An inner cell has more particles than one of its children, and at least two of these.
     parts = room.array("records", (2 * n, 4), np.int32)
     most = 8 * LEVELS * (n // limit) + 1
     stem, room_of_branches = np.empty((most, 4), np.int32), np.empty((most, 4), np.int64)
-    root, coarse = np.array([0, n, 0]), 0
-    while True:
-        count, found = _divide(key, leaf, coarse, limit, root, stem, room_of_branches)
-        branches, counts = room_of_branches[:found], np.empty(found, np.int64)
-        levels = np.empty((found, LEVELS + 1), np.int64)
-        each(
-            _divide_branch,
-            (key, leaf, coarse, branches, parts, counts, levels),
-            [(k,) for k in range(found)],
-        )
-        if coarse:
-            break
-        coarse = _usual_level(levels.sum(axis=0)) - FINER
-        if coarse <= 0:
-            break
+    coarse = _usual_level(key, leaf, parts) - FINER
+    root = np.array([0, n, 0])
+    count, found = _divide(key, leaf, coarse, limit, root, stem, room_of_branches)
+    branches, counts = room_of_branches[:found], np.empty(found, np.int64)
+    each(_divide_branch, (key, leaf, coarse, branches, parts, counts), _each_of(found))
     cells: NDArray[np.int32] = room.array("cells", (count + int(counts.sum()) - found, 4), np.int32)
     after = np.empty(found, np.int64)
     _number(stem, branches, parts, counts, cells, after)
-    each(_move_branch, (branches, parts, counts, after, cells), [(k,) for k in range(found)])
+    each(_move_branch, (branches, parts, counts, after, cells), _each_of(found))
     return cells
 
 
-def _usual_level(particles: NDArray[np.int64]) -> int:
-    """Level of the cube around the leaf of the median particle, from how many are at each level."""
+def _usual_level(key: NDArray[np.uint64], leaf: int, parts: NDArray[np.int32]) -> int:
+    """Level of the cube around the leaf of the median particle, leaves sorted by that.
+
+    Of many particles, some here and there are divided to know it.
+    """
+    n = len(key)
+    number = min(max(n // WINDOW, 1), WINDOWS)
+    starts = np.arange(number) * n // number
+    ends = starts + WINDOW if number > 1 else np.array([n])
+    some = np.stack([starts, ends, 0 * starts, 0 * starts], axis=1)
+    counts, levels = np.empty(number, np.int64), np.zeros((number, LEVELS + 1), np.int64)
+    each(_divide_branch, (key, leaf, 0, some, parts, counts), _each_of(number))
+    each(_find_levels, (key, some, parts, counts, levels), _each_of(number))
+    particles = levels.sum(axis=0)
     return int(np.searchsorted(2 * np.cumsum(particles), particles.sum()))
+
+
+def _each_of(number: int) -> Calls:
+    return Calls([(k,) for k in range(number)], alike=True)
 
 
 def _leaves(cells: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
