@@ -94,19 +94,6 @@ def _find_parts(key: Any, splitters: Any, steps: Any, part: Any, counts: Any) ->
 
 
 @jit(numba=False)
-def _accumulate(counts: Any, starts: Any) -> None:
-    """Make counts of blocks (blocks, parts) places where each block begins to write."""
-    sum_of_all = 0
-    for part in range(counts.shape[1]):
-        starts[part] = sum_of_all
-        for block in range(counts.shape[0]):
-            count = counts[block, part]
-            counts[block, part] = sum_of_all
-            sum_of_all += count
-    starts[counts.shape[1]] = sum_of_all
-
-
-@jit(numba=False)
 def _scatter(
     points: Any, mass: Any, low: Any, length: Any, unit: Any, key: Any, part: Any, first: Any,
     to: Any, body: Any, tag: Any,
@@ -142,44 +129,39 @@ def _pass(key: Any, row: Any, shift: Any, counts: Any, new_key: Any, new_row: An
 
 
 @jit(numba=False)
-def _two_passes(
-    key: Any, row: Any, shift: Any, counts: Any, spare_key: Any, spare_row: Any
-) -> None:
-    """Sort by two digits."""
-    _pass(key, row, shift, counts, spare_key, spare_row)
-    _pass(spare_key, spare_row, shift + np.uint64(_BITS), counts, key, row)
-
-
-@jit(numba=False)
 def _sort(key: Any, row: Any, spare_key: Any, spare_row: Any, counts: Any) -> None:
     """Sort keys and what is with them: by the highest digits in which they differ, and where those
     are equal, which few are, by the rest."""
-    differ = np.uint64(0)
+    differ, shift, two = np.uint64(0), np.uint64(0), np.uint64(2 * _BITS)
     for i in range(key.size):
         differ |= key[i] ^ key[0]
-    shift, two = np.uint64(0), np.uint64(2 * _BITS)
     while (differ >> shift) >> two != 0:
         shift += np.uint64(1)
-    _two_passes(key, row, shift, counts, spare_key, spare_row)
-    first = 0
-    while shift > 0 and first < key.size:
-        last = first + 1
-        while last < key.size and key[last] >> shift == key[first] >> shift:
-            last += 1
-        if last - first > _FEW:
-            low = np.uint64(0)
-            while low < shift:
-                some, rows, width = key[first:last], row[first:last], last - first
-                _two_passes(some, rows, low, counts, spare_key[:width], spare_row[:width])
-                low += two
-        else:
-            for i in range(first + 1, last):
-                k, r, at = key[i], row[i], i
-                while at > first and key[at - 1] > k:
-                    key[at], row[at] = key[at - 1], row[at - 1]
-                    at -= 1
-                key[at], row[at] = k, r
-        first = last
+    first, last, low, high = 0, key.size, shift, shift + two
+    done = 0
+    while True:
+        some, rows, width = key[first:last], row[first:last], last - first
+        while low < high:
+            _pass(some, rows, low, counts, spare_key[:width], spare_row[:width])
+            low += np.uint64(_BITS)
+            _pass(spare_key[:width], spare_row[:width], low, counts, some, rows)
+            low += np.uint64(_BITS)
+        # The next of many keys whose highest digits are equal.
+        first, last = done, done
+        while shift > 0 and last - first <= _FEW and last < key.size:
+            first, last = last, last + 1
+            while last < key.size and key[last] >> shift == key[first] >> shift:
+                last += 1
+            if last - first <= _FEW:
+                for i in range(first + 1, last):
+                    k, r, at = key[i], row[i], i
+                    while at > first and key[at - 1] > k:
+                        key[at], row[at] = key[at - 1], row[at - 1]
+                        at -= 1
+                    key[at], row[at] = k, r
+        if last - first <= _FEW:
+            break
+        done, low, high = last, np.uint64(0), shift
 
 
 @jit(numba=False)
@@ -226,7 +208,6 @@ def morton_order(
     cuts = [n * block // number for block in range(number + 1)]
     key, order = room.array("key", (n,), np.uint64), room.array("order", (n,), np.uint32)
     part, counts = room.array("marks", (n,), np.uint16), np.empty((number, parts), np.uint32)
-    starts = np.empty(parts + 1, np.int64)
 
     def find(block: int) -> None:
         rows = slice(cuts[block], cuts[block + 1])
@@ -234,7 +215,11 @@ def morton_order(
         _find_parts(key[rows], splitters, steps, part[rows], counts[block])
 
     share(find, number)
-    _accumulate(counts, starts)
+    # Where each block begins to write to each part, after the blocks before it.
+    sizes = counts.T.reshape(-1)
+    ends = np.cumsum(sizes, dtype=np.int64)
+    to = np.ascontiguousarray((ends - sizes).reshape(parts, number).T)
+    starts = np.append(to[0], n)
     # Columns 0 to 3 are (x, y, z, m), 4 and 5 the key and the row, as integers.
     body = room.array("records", (n, 6))
     tag = body.view(np.uint64)
@@ -243,7 +228,7 @@ def morton_order(
         rows = slice(cuts[block], cuts[block + 1])
         _scatter(
             points, mass, low, length, unit, key[rows], part[rows], cuts[block],
-            counts[block], body, tag,
+            to[block], body, tag,
         )  # fmt: skip
 
     share(scatter, number)

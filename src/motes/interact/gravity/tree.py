@@ -33,7 +33,7 @@ BRANCHES, LEAST = 64, 1024
 """Parts into which particles are divided before the rest is divided in parallel, about, and
 particles of a part at least."""
 
-WINDOW, WINDOWS = 1024, 128
+WINDOW, WINDOWS = 1024, 64
 """Particles that are neighbours on the curve, and how many times as many are looked at to know the
 usual level of leaves."""
 
@@ -90,15 +90,20 @@ def _most(leaf: Any, level: Any, coarse: Any) -> Any:
 
 @jit(numba=False)
 def _divide(
-    key: Any, leaf: Any, coarse: Any, limit: Any, root: Any, cells: Any, branches: Any
-) -> Any:
-    """Write the rows of a cell `root` (start, end, level) and of what is under it; return their
-    number and that of branches.
+    key: Any, leaf: Any, coarse: Any, limit: Any, roots: Any, written: Any, table: Any,
+    branches: Any, which: Any,
+) -> None:  # fmt: skip
+    """Write the rows of a cell of `roots` and of what is under it.
+
+    `roots` (k, 4) are particles START to END, a level, and anything. Rows are written to a table
+    from row 2 START on; to `written` (k, 2) their number, and that of branches: cells of at most
+    `limit` particles, which are not divided, but written to `branches` (b, 4), with their row.
 
     Leaves have at most `leaf` particles, or FEW if they fill a cube of a level under `coarse`, or
-    one if it is LARGER levels under that. Cells of at most `limit` particles are not divided, but
-    written to `branches` (k, 4): their particles START to END, their level and their row.
+    one if it is LARGER levels under that.
     """
+    root = roots[which]
+    cells = table[2 * root[0] : 2 * root[1]]
     stack, cuts = np.empty((8 * LEVELS + 1, 2), np.int64), np.empty(8, np.int64)
     cells[0, START], cells[0, END] = root[0], root[1]
     stack[0, 0], stack[0, 1] = 0, root[2]
@@ -148,24 +153,14 @@ def _divide(
             stack[depth, 0], stack[depth, 1] = child, level + 1
             depth += 1
         count += number
-    return count, found
-
-
-@jit(numba=False)
-def _divide_branch(
-    key: Any, leaf: Any, coarse: Any, branches: Any, cells: Any, counts: Any, k: Any
-) -> None:
-    """Write the rows of what is in a branch from row 2 START on."""
-    branch = branches[k]
-    own = cells[2 * branch[0] : 2 * branch[1]]
-    counts[k], _ = _divide(key, leaf, coarse, 0, branch, own, branches)
+    written[which, 0], written[which, 1] = count, found
 
 
 @jit(numba=False)
 def _find_levels(key: Any, some: Any, cells: Any, counts: Any, levels: Any, k: Any) -> None:
     """Count particles by the level of the cube around their leaf, but for leaves that are cut."""
     first, last = some[k, 0], some[k, 1]
-    for cell in range(2 * first, 2 * first + counts[k]):
+    for cell in range(2 * first, 2 * first + counts[k, 0]):
         start, end = cells[cell, START], cells[cell, END]
         is_whole = (start > first or start == 0) and (end < last or end == key.size)
         if cells[cell, NUMBER] == 0 and (is_whole or end - start == last - first):
@@ -190,10 +185,10 @@ def _number(stem: Any, branches: Any, parts: Any, counts: Any, cells: Any, after
         first, number = stem[old, FIRST], stem[old, NUMBER]
         cells[cell, START], cells[cell, END] = stem[old, START], stem[old, END]
         cells[cell, FIRST], cells[cell, NUMBER] = count, number
-        if branch < counts.size and branches[branch, 3] == old:
+        if branch < counts.shape[0] and branches[branch, 3] == old:
             cells[cell, NUMBER] = parts[2 * branches[branch, 0], NUMBER]
             after[branch] = count
-            count += counts[branch] - 1
+            count += counts[branch, 0] - 1
             branch += 1
             continue
         for k in range(number):
@@ -207,7 +202,7 @@ def _number(stem: Any, branches: Any, parts: Any, counts: Any, cells: Any, after
 def _move_branch(branches: Any, parts: Any, counts: Any, after: Any, cells: Any, k: Any) -> None:
     """Write the cells under a branch, which know each other's rows."""
     start, shift = 2 * branches[k, 0], after[k] - 1
-    for i in range(1, counts[k]):
+    for i in range(1, counts[k, 0]):
         old, new = parts[start + i], cells[shift + i]
         new[START], new[END], new[NUMBER] = old[START], old[END], old[NUMBER]
         new[FIRST] = old[FIRST] + shift
@@ -265,13 +260,16 @@ def _cells(key: NDArray[np.uint64], leaf: int, room: Room) -> NDArray[np.int32]:
     # An inner cell has more particles than one of its children, and at least two of these.
     parts = room.array("records", (2 * n, 4), np.int32)
     most = 8 * LEVELS * (n // limit) + 1
-    stem, room_of_branches = np.empty((most, 4), np.int32), np.empty((most, 4), np.int64)
+    stem, branches = np.empty((most, 4), np.int32), np.empty((most, 4), np.int64)
     coarse = _usual_level(key, leaf, parts) - FINER
-    root = np.array([0, n, 0])
-    count, found = _divide(key, leaf, coarse, limit, root, stem, room_of_branches)
-    branches, counts = room_of_branches[:found], np.empty(found, np.int64)
-    each(_divide_branch, (key, leaf, coarse, branches, parts, counts), _each_of(found))
-    cells: NDArray[np.int32] = room.array("cells", (count + int(counts.sum()) - found, 4), np.int32)
+    root = np.array([[0, n, 0, 0]])
+    counts = np.empty((most, 2), np.int64)
+    _divide(key, leaf, coarse, limit, root, counts, stem, branches, 0)
+    count, found = counts[0]
+    branches, counts, nothing = branches[:found], counts[:found], branches[:0]
+    each(_divide, (key, leaf, coarse, 0, branches, counts, parts, nothing), _each_of(found))
+    count += counts[:, 0].sum() - found
+    cells: NDArray[np.int32] = room.array("cells", (int(count), 4), np.int32)
     after = np.empty(found, np.int64)
     _number(stem, branches, parts, counts, cells, after)
     each(_move_branch, (branches, parts, counts, after, cells), _each_of(found))
@@ -288,8 +286,8 @@ def _usual_level(key: NDArray[np.uint64], leaf: int, parts: NDArray[np.int32]) -
     starts = np.arange(number) * n // number
     ends = starts + WINDOW if number > 1 else np.array([n])
     some = np.stack([starts, ends, 0 * starts, 0 * starts], axis=1)
-    counts, levels = np.empty(number, np.int64), np.zeros((number, LEVELS + 1), np.int64)
-    each(_divide_branch, (key, leaf, 0, some, parts, counts), _each_of(number))
+    counts, levels = np.empty((number, 2), np.int64), np.zeros((number, LEVELS + 1), np.int64)
+    each(_divide, (key, leaf, 0, 0, some, counts, parts, some[:0]), _each_of(number))
     each(_find_levels, (key, some, parts, counts, levels), _each_of(number))
     particles = levels.sum(axis=0)
     return int(np.searchsorted(2 * np.cumsum(particles), particles.sum()))
@@ -301,17 +299,5 @@ def _each_of(number: int) -> Calls:
 
 def _leaves(cells: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
     """Rows of the leaves, and the most particles in one."""
-    found = np.empty(len(cells), np.int32)
-    count, largest = _find_leaves(cells, found)
-    return found[:count], largest
-
-
-@jit(numba=False)
-def _find_leaves(cells: Any, found: Any) -> Any:
-    count, largest = 0, 0
-    for cell in range(cells.shape[0]):
-        if cells[cell, NUMBER] == 0:
-            found[count] = cell
-            count += 1
-            largest = max(largest, cells[cell, END] - cells[cell, START])
-    return count, largest
+    leaves = np.flatnonzero(cells[:, NUMBER] == 0).astype(np.int32)
+    return leaves, int((cells[leaves, END] - cells[leaves, START]).max())

@@ -57,7 +57,7 @@ def _measurer(order: int) -> Callable[..., None]:
     squares = (order + 1) // 2
     root = 0.5 / squares
 
-    @jit(inline=True)
+    @jit(inline=True, flags=EXACT)
     def raised(square: Any) -> Any:
         """s^q from s^2."""
         power = square
@@ -65,20 +65,31 @@ def _measurer(order: int) -> Callable[..., None]:
             power = power * square
         return power
 
-    @jit(numba=False)
+    @jit(flags=EXACT, numba=False)
     def measure(tree: Tree, cell: Any) -> None:
         cells, bodies, place = tree.cells, tree.bodies, tree.place
         start, end, first_child, number = cells[cell]
+        xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
+        ms = place[3, start:end]
+        whole = xs.size // LANES * LANES
         x = y = z = mass = 0.0
-        weights = LIGHT * (end - start)
         if number == 0:
-            for i in range(start, end):
-                m = place[3, i]
+            sum_x, sum_y, sum_z, sum_m = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
+            for i in range(0, whole, LANES):
+                m = read(ms, i)
+                weight = m + LIGHT
+                sum_m = sum_m + m
+                sum_x = sum_x + weight * read(xs, i)
+                sum_y = sum_y + weight * read(ys, i)
+                sum_z = sum_z + weight * read(zs, i)
+            x, y, z, mass = total(sum_x), total(sum_y), total(sum_z), total(sum_m)
+            for i in range(whole, xs.size):
+                m = ms[i]
                 mass += m
                 m += LIGHT
-                x += m * place[0, i]
-                y += m * place[1, i]
-                z += m * place[2, i]
+                x += m * xs[i]
+                y += m * ys[i]
+                z += m * zs[i]
         else:
             for child in range(first_child, first_child + number):
                 m = bodies[child, MASS]
@@ -87,13 +98,10 @@ def _measurer(order: int) -> Callable[..., None]:
                 x += m * bodies[child, X]
                 y += m * bodies[child, Y]
                 z += m * bodies[child, Z]
-        weights += mass
+        weights = mass + LIGHT * (end - start)
         x, y, z = x / weights, y / weights, z / weights
         r2, radius, spread_out = 0.0, 0.0, 0.0
         if number == 0 or end - start <= MANY:
-            xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
-            ms = place[3, start:end]
-            whole = xs.size // LANES * LANES
             far, sums = spread(0.0), spread(0.0)
             for i in range(0, whole, LANES):
                 dx, dy, dz = read(xs, i) - x, read(ys, i) - y, read(zs, i) - z
