@@ -9,7 +9,6 @@ phi_i = -G sum_j m_j / r, r = |x_j - x_i|, weakened at short range by a softenin
 place do not pull each other, and no particle counts itself.
 """
 
-# mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
 import math
@@ -20,10 +19,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from motes.errors import likely
 from motes.interact.gravity.direct import direct
-from motes.interact.gravity.multipole import multipole
+from motes.interact.gravity.multipole import Units, multipole
 from motes.interact.gravity.softening import SUPPORT, center_depth
+from motes.interact.gravity.survey import of_columns
 from motes.interact.gravity.tree import Box
-from motes.jit import blocks, jit, share
 
 __all__ = ["acceleration", "field", "potential"]
 
@@ -69,7 +68,7 @@ def acceleration(
     Source of the multipole method: Dehnen, Computational Astrophysics and Cosmology 1 (2014) 1.
     """
     problem = _Problem(x, m, G, softening, softening_kernel, tolerance, method, targets)
-    return problem.acceleration(problem.sums(False))
+    return problem.fields(False)[0]
 
 
 def potential(
@@ -89,7 +88,7 @@ def potential(
     (k,). The energy of all is half the sum of m phi. Coincident particles count only if softened.
     """
     problem = _Problem(x, m, G, softening, softening_kernel, tolerance, method, targets)
-    return problem.potential(problem.sums(True))
+    return problem.fields(True)[1]
 
 
 def field(
@@ -105,8 +104,7 @@ def field(
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Accelerations and potentials together, as `acceleration` and `potential` give them."""
     problem = _Problem(x, m, G, softening, softening_kernel, tolerance, method, targets)
-    sums = problem.sums(True)
-    return problem.acceleration(sums), problem.potential(sums)
+    return problem.fields(True)
 
 
 class _Problem:
@@ -123,9 +121,12 @@ class _Problem:
         method: str,
         targets: ArrayLike | None,
     ) -> None:
-        position = _points(x, "x")
-        points = position if targets is None else _points(targets, "targets")
-        mass = _masses(m, len(position))
+        position, *corners = _points(x, "x")
+        points = position
+        if targets is not None:
+            points, low, high = _points(targets, "targets")
+            corners = [np.minimum(low, corners[0]), np.maximum(high, corners[1])]
+        self.mass, self.total = _masses(m, len(position))
         self.dtype = position.dtype
         self.G = _number(G, "G")
         softening = _number(softening, "softening", at_least=0.0)
@@ -134,45 +135,46 @@ class _Problem:
         self.tolerance = _tolerance(tolerance, self.method, self.dtype)
         self.apart = targets is not None
 
-        self.low, size = _cube(position, points)
+        self.low, high = corners
+        with np.errstate(over="ignore"):
+            size = float((high - self.low).max()) if len(position) or len(points) else 0.0
         if not size < FARTHEST:
             raise ValueError(f"x spans {size:g}; it must be below {FARTHEST:g}: use other units.")
         self.length = _power_of_two(size)
         self.cube = size or 1.0
-        self.unit_mass = _power_of_two(float(mass.sum()))
+        self.unit_mass = _power_of_two(self.total)
         self.position, self.points = position, points
-        self.mass = mass / self.unit_mass
         self.law = kernel if softening > 0.0 else "newton"
         self.size = softening * (SUPPORT if kernel == "spline" else 1.0) / self.length
 
-    def sums(self, potential: bool) -> NDArray[Any]:
-        """Sums of m s dx and m w over all sources (4, k), in these units."""
-        if not len(self.points) or not self.mass.any():
-            return np.zeros((4, len(self.points)))
+    def fields(self, potential: bool) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Accelerations (k, 3), and with `potential` potentials (k,) without what each particle
+        adds to itself, in the caller's units."""
+        if not len(self.points) or not self.total:
+            return np.zeros((len(self.points), 3), self.dtype), np.zeros(
+                len(self.points), self.dtype
+            )
+        per_length = self.G * self.unit_mass / self.length
+        own = 0.0 if self.apart else center_depth(self.law, self.size)
+        units = Units(per_length / self.length, -per_length, own)
         if self.tolerance is None or self._few():
-            source = np.array([*(self.position.T / self.length), self.mass], self.dtype)
-            target = np.array(self.points.T / self.length, self.dtype, order="C")
-            return direct(source, target, self.law, self.size, potential)
+            return self._direct(potential, units)
         targets = self.points if self.apart else None
-        box = Box(self.low, self.cube, self.length)
-        return multipole(
-            self.position, self.mass, targets, box, self.law, self.size, self.tolerance, potential
-        )
+        box = Box(self.low, self.cube, self.length, self.unit_mass)
+        kind = self.law, self.size, self.tolerance, potential
+        return multipole(self.position, self.mass, targets, box, *kind, units)
 
-    def acceleration(self, sums: NDArray[Any]) -> NDArray[Any]:
-        """(k, 3) in the caller's units."""
-        unit = self.G * self.unit_mass / self.length / self.length
-        result: NDArray[Any] = np.empty((sums.shape[1], 3), self.dtype)
-        np.multiply(sums[:3].T, unit, out=result, casting="same_kind")
-        return result
-
-    def potential(self, sums: NDArray[Any]) -> NDArray[Any]:
-        """(k,) in the caller's units, without what each particle adds to itself."""
-        depth = sums[3]
-        if not self.apart:
-            depth = depth - self.mass * center_depth(self.law, self.size)
-        scaled: NDArray[Any] = depth * (-self.G * self.unit_mass / self.length)
-        return scaled.astype(self.dtype)
+    def _direct(self, potential: bool, units: Units) -> tuple[NDArray[Any], NDArray[Any]]:
+        mass = self.mass / self.unit_mass
+        source = np.array([*(self.position.T / self.length), mass], self.dtype)
+        target = np.array(self.points.T / self.length, self.dtype, order="C")
+        sums = direct(source, target, self.law, self.size, potential)
+        pull: NDArray[Any] = np.empty((sums.shape[1], 3), self.dtype)
+        np.multiply(sums[:3].T, units.pull, out=pull, casting="same_kind")
+        if not potential:
+            return pull, pull[:0, 0]
+        depth = sums[3] if self.apart else sums[3] - mass * units.own
+        return pull, (depth * units.depth).astype(self.dtype)
 
     def _few(self) -> bool:
         """Whether direct sums are asked for, or faster."""
@@ -194,36 +196,42 @@ def crossover(tolerance: float, dtype: np.dtype[Any]) -> float:
     return base * math.pow(growth, digits - 3.0)
 
 
-def _points(values: ArrayLike, name: str) -> NDArray[Any]:
+def _points(
+    values: ArrayLike, name: str
+) -> tuple[NDArray[Any], NDArray[np.float64], NDArray[np.float64]]:
+    """Points (n, 3), and the smallest and largest coordinates (3,) of all."""
     points = np.asarray(values)
     if points.dtype != np.float32:
+        casting: Any = "same_kind" if points.size else "unsafe"
         try:
-            points = points.astype(np.float64, casting="same_kind" if points.size else "unsafe")
+            points = points.astype(np.float64, casting=casting, copy=False)
         except TypeError:
             raise ValueError(f"{name} must be real numbers, not {points.dtype}.") from None
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"{name} must have the shape (n, 3), not {points.shape}.")
-    _check_finite(points, name)
-    return points
+    low, high, sums = of_columns(points)
+    _check_finite(points, sums, name)
+    return points, low, high
 
 
-def _masses(values: ArrayLike, count: int) -> NDArray[np.float64]:
+def _masses(values: ArrayLike, count: int) -> tuple[NDArray[np.float64], float]:
+    """Masses (n,) and their sum."""
     mass = np.asarray(values, np.float64)
     if mass.shape != (count,):
         raise ValueError(
             f"m must have the shape ({count},), one mass per row of x, not {mass.shape}."
         )
-    _check_finite(mass, "m")
-    if mass.size and mass.min() < 0:
+    low, _, total = of_columns(mass[:, None])
+    _check_finite(mass, total, "m")
+    if low[0] < 0:
         i = int(np.argmax(mass < 0))
         raise ValueError(f"m[{i}] = {mass[i]:g}; masses must be at least 0.")
-    return mass
+    return mass, float(total[0])
 
 
-def _check_finite(values: NDArray[Any], name: str) -> None:
-    with np.errstate(all="ignore"):
-        doubtful = not np.isfinite(values.sum())
-    if doubtful and not np.isfinite(values).all():
+def _check_finite(values: NDArray[Any], sums: NDArray[np.float64], name: str) -> None:
+    """Sums that are finite are those of finite values."""
+    if not np.isfinite(sums).all() and not np.isfinite(values).all():
         i = tuple(int(k) for k in np.argwhere(~np.isfinite(values))[0])
         place = ", ".join(str(k) for k in i)
         raise ValueError(f"{name}[{place}] = {values[i]}; all values must be finite.")
@@ -263,35 +271,6 @@ def _tolerance(tolerance: float | None, method: str, dtype: np.dtype[Any]) -> fl
             + ("; give x as float64." if TIGHTEST["double"] <= number < least else ".")
         )
     return number
-
-
-def _cube(*clouds: NDArray[Any]) -> tuple[NDArray[np.float64], float]:
-    """Lowest corner and edge of the cube around points."""
-    found: NDArray[np.float64] = np.concatenate([_corners(cloud) for cloud in clouds])
-    if not len(found):
-        return np.zeros(3), 0.0
-    low, high = found[:, :, 0].min(axis=0), found[:, :, 1].max(axis=0)
-    with np.errstate(over="ignore"):
-        return low, float((high - low).max())
-
-
-def _corners(cloud: NDArray[Any]) -> NDArray[np.float64]:
-    """Smallest and largest coordinates of each block of rows, (blocks, 3, 2)."""
-    ranges = blocks(len(cloud), 1 << 16)
-    found = np.empty((len(ranges), 3, 2))
-    share(lambda k: _measure(cloud, *ranges[k], found[k]), len(ranges))
-    return found
-
-
-@jit
-def _measure(cloud: Any, first: Any, last: Any, corners: Any) -> None:
-    """Smallest and largest coordinates of rows `first` to `last`."""
-    for axis in range(3):
-        low, high = np.inf, -np.inf
-        for i in range(first, last):
-            value = np.float64(cloud[i, axis])
-            low, high = min(low, value), max(high, value)
-        corners[axis, 0], corners[axis, 1] = low, high
 
 
 def _power_of_two(value: float) -> float:

@@ -13,7 +13,7 @@ from motes.interact.gravity.expansions import folded, terms
 from motes.interact.gravity.lanes import LANES, read, write
 from motes.interact.gravity.multipole import Plan, Problem
 from motes.interact.gravity.tree import NUMBER, SPREAD, Box, octree
-from motes.interact.gravity.upward import summarize
+from motes.interact.gravity.upward import MANY, summarize
 from motes.jit import jit
 from motes.machine.lanes import choose
 
@@ -143,8 +143,8 @@ def test_the_error_falls_with_the_order(law, orders):
     for order in orders:
         plan = Plan(order=order, low=order, leaf=16, real=np.float64, opening=0.5)
         problem = Problem.build(x, m, None, box(x), law, size, True, plan)
-        sums = problem.unsorted(problem.solve(problem.limits(np.inf, np.inf, np.inf)))
-        errors.append(relative(sums[:3].T, exact))
+        sums, _ = problem.unsorted(problem.solve(problem.limits(np.inf, np.inf, np.inf)))
+        errors.append(relative(sums, exact))
     assert np.all(np.diff(np.log(errors)) < -np.log(1.5) * np.diff(orders))
     assert errors[-1] < (1e-6 if law == "newton" else 1e-4)
 
@@ -159,8 +159,8 @@ def test_errors_are_the_same_part_of_what_one_expansion_may_neglect(name, order)
     plan = Plan(order=order, low=order - 2, leaf=32, real=np.float64)
     problem = Problem.build(x, m, None, box(x), "newton", 0.0, False, plan)
     scale = np.sqrt((exact**2).sum(axis=1).mean())
-    sums = problem.unsorted(problem.solve(problem.limits(allowed * scale, np.inf, 0.0)))
-    ratio = relative(sums[:3].T, exact) / allowed
+    sums, _ = problem.unsorted(problem.solve(problem.limits(allowed * scale, np.inf, 0.0)))
+    ratio = relative(sums, exact) / allowed
     assert 0.05 < ratio < 0.3
 
 
@@ -221,6 +221,21 @@ def test_moments_of_every_cell_are_the_sums_over_its_particles(harmonic):
         exact = np.array(folded(kind, whole))
         found = tree.moments[cell, : len(exact)]
         np.testing.assert_allclose(found, exact, rtol=1e-10, atol=1e-10 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("name", ["plummer", "two clusters"])
+def test_balls_of_large_cells_hold_all_that_is_in_them(name):
+    """Radius and spread of a cell of many particles are its own or somewhat larger."""
+    x, m = distributions(9000)[name]
+    tree = summarize(octree(x, m, box(x), 20), 6, True, np.float64, True)
+    large = np.flatnonzero(tree.cells[:, 1] - tree.cells[:, 0] > MANY)
+    assert len(large) > 5
+    for cell in large:
+        start, end = tree.cells[cell, :2]
+        away = np.linalg.norm(tree.place[:3, start:end].T - tree.bodies[cell, :3], axis=1)
+        spread = np.average(away**6, weights=tree.place[3, start:end]) ** (1 / 6)
+        assert 1 - 1e-12 < tree.bodies[cell, 3] / away.max() < 1.5
+        assert 1 - 1e-12 < tree.balls[cell, SPREAD] / spread < 1.5
 
 
 def test_a_tree_holds_every_particle_once():

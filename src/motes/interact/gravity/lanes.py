@@ -11,7 +11,7 @@ from motes.jit import EXACT, jit
 from motes.machine.lanes import choose, put, rough_inverse_root, spread_over, take
 from motes.machine.traced import LANES
 
-__all__ = ["LANES", "inverse_root", "maximum", "read", "spread", "write"]
+__all__ = ["LANES", "inverse_root", "maximum", "minimum", "read", "spread", "write"]
 
 HALF, MORE = np.float32(0.5), np.float32(1.5)
 
@@ -32,6 +32,12 @@ def write(column: Any, first: Any, lanes: Any) -> None:
 def maximum(a: Any, b: Any) -> Any:
     """The larger of each two; b where a is not a number."""
     return choose(a > b, a, b)
+
+
+@jit(inline=True, flags=EXACT)
+def minimum(a: Any, b: Any) -> Any:
+    """The smaller of each two; b where a is not a number."""
+    return choose(a < b, a, b)
 
 
 @jit(inline=True, flags=EXACT)

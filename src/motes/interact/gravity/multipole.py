@@ -4,17 +4,19 @@ Sources: Greengard and Rokhlin, Journal of Computational Physics 73 (1987) 325; 
 Computational Astrophysics and Cosmology 1 (2014) 1, for acceptance by an estimate of the error.
 """
 
+# mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from motes.interact.gravity.desk import Desk, Limits, desk
+from motes.interact.gravity.room import Room, borrowed
 from motes.interact.gravity.sample import Sample, sample_of
 from motes.interact.gravity.translations import translations
 from motes.interact.gravity.tree import (
@@ -22,11 +24,11 @@ from motes.interact.gravity.tree import (
     Box,
     Tree,
     octree,
-    unpermute,
 )
 from motes.interact.gravity.upward import divide_work, summarize
 from motes.interact.gravity.walk import walker
-from motes.jit import blocks, share, threads
+from motes.jit import blocks, each, jit, share, threads
+from motes.machine.lanes import fetch
 
 SINGLE_FROM = 4e-6
 """Smallest tolerance that single precision keeps."""
@@ -52,6 +54,9 @@ TRIALS = 8
 
 TASKS, FEWEST_TASKS, PARTICLES_OF_A_TASK = 128, 8, 2048
 """Parts of the walk; each of the threads takes one after the other. A part costs 0.1 ms more."""
+
+BLOCK, AHEAD = 1 << 14, 16
+"""Rows that one thread brings back to the caller's order, and how far ahead it looks at places."""
 
 STRICTER, STRICTEST, LOW_ORDER = 10.0, 100.0, 5
 """How much less the walk that the sample is compared with may neglect, and how much below an order:
@@ -89,6 +94,18 @@ def plan(tolerance: float, law: str) -> Plan:
     return Plan(order, max(int(0.72 * order), 1), leaf, real)
 
 
+class Units(NamedTuple):
+    """What sums are multiplied by in the caller's units."""
+
+    pull: float = 1.0
+    depth: float = 1.0
+    own: float = 0.0
+    """What a unit mass adds to the depth at its own place, and is taken away."""
+
+
+AS_THEY_ARE = Units()
+
+
 def multipole(
     source: NDArray[Any],
     mass: NDArray[np.float64],
@@ -98,16 +115,20 @@ def multipole(
     size: float,
     tolerance: float,
     potential: bool,
-) -> NDArray[np.float64]:
+    units: Units,
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Sums as `direct` gives them, of sources (n, 3) with masses (n,) at targets (k, 3) or sources.
 
-    Points are in the caller's units and inside of the box; `size` and the result are in those of
-    the box, and the sum of the masses is about 1. Returns (4, k), or (3, k) without `potential`.
-    The rms error on a sample of targets is at most SAFETY times the tolerance, of accelerations
-    and, with `potential`, of potentials.
+    Points are inside of the box, and they and the masses in the caller's units, `size` in those of
+    the box. Returns accelerations (k, 3), and with `potential` potentials (k,), in the precision of
+    the sources. The rms error on a sample of targets is at most SAFETY times the tolerance, of
+    accelerations and, with `potential`, of potentials.
     """
-    problem = Problem.build(source, mass, target, box, law, size, potential, plan(tolerance, law))
-    return problem.unsorted(problem.solve(problem.limits_for(tolerance)))
+    with borrowed() as room, borrowed() as other:
+        kind = law, size, potential, plan(tolerance, law)
+        problem = Problem.build(source, mass, target, box, *kind, room, other)
+        sums = problem.solve(problem.limits_for(tolerance))
+        return problem.unsorted(sums, units, source.dtype)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,15 +156,20 @@ class Problem:
         size: float,
         potential: bool,
         plan: Plan,
+        room: Room | None = None,
+        other: Room | None = None,
     ) -> Problem:
-        """Sort the particles into trees and compute the moments."""
+        """Sort the particles into trees and compute the moments, in a room for the sources and one
+        for other targets."""
+        room = room or Room()
         kind = plan.order, law != "plummer", plan.real
-        sources = summarize(octree(source, mass, box, plan.leaf), *kind, True)
+        sources = summarize(octree(source, mass, box, plan.leaf, room), *kind, True, room)
         targets = sources
         if target is not None:
-            tree = octree(target, np.full(len(target), 1 / len(target)), box, plan.leaf)
-            targets = summarize(tree, *kind, False)
-        out: NDArray[Any] = np.empty((4 if potential else 3, targets.place.shape[1]), plan.real)
+            equal = np.full(len(target), box.mass / len(target))
+            other = other or Room()
+            targets = summarize(octree(target, equal, box, plan.leaf, other), *kind, False, other)
+        out = room.array("sums", (4 if potential else 3, targets.place.shape[1]), plan.real)
         return Problem(targets, sources, law, size, potential, plan, out)
 
     def limits(self, error: float, force: float, rounding: float) -> Limits:
@@ -211,13 +237,14 @@ class Problem:
         ranges = np.stack([starts, np.append(starts[1:], n)], axis=1)
         return self._walk(np.array_split(ranges, len(ranges)), limits)
 
-    def unsorted(self, sums: NDArray[Any]) -> NDArray[np.float64]:
-        """Sums in the order in which the targets came."""
-        result = np.empty(sums.shape[::-1])
-        order, ranges = self.targets.order, blocks(sums.shape[1], 1 << 16)
-
-        share(lambda k: unpermute(sums, order, result, *ranges[k]), len(ranges))
-        return result.T
+    def unsorted(
+        self, sums: NDArray[Any], units: Units = AS_THEY_ARE, real: DTypeLike = np.float64
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Accelerations (k, 3), and potentials (k,) or none, in the order in which targets came."""
+        n, order, mass = sums.shape[1], self.targets.order, self.targets.place[3]
+        pull, depth = np.empty((n, 3), real), np.empty(n if self.potential else 0, real)
+        each(unpermute, (sums, order, mass, units, pull, depth), blocks(n, BLOCK))
+        return pull, depth
 
     def _walk(self, parts: list[NDArray[np.int64]], limits: Limits) -> NDArray[Any]:
         """Sums at targets, whole leaves; each part is ranges (k, 2) of rows and one task."""
@@ -257,6 +284,20 @@ class Problem:
             parts.append((tried[3] - exact[3], np.abs(exact[3])))
         rounding = 8 * float(np.finfo(self.plan.real).eps)
         return max(sample.relative(wrong, values, rounding) for wrong, values in parts)
+
+
+@jit(numba=False)
+def unpermute(
+    sums: Any, order: Any, mass: Any, units: Units, pull: Any, depth: Any, first: Any, last: Any
+) -> None:
+    """Write columns `first` to `last` of sums in the tree's order to rows where they came from."""
+    for i in range(first, last):
+        fetch(pull, 3 * np.intp(order[min(i + AHEAD, last - 1)]))
+        row = order[i]
+        for axis in range(3):
+            pull[row, axis] = np.float64(sums[axis, i]) * units.pull
+        if depth.size > 0:
+            depth[row] = (np.float64(sums[3, i]) - mass[i] * units.own) * units.depth
 
 
 def _lengths(sums: NDArray[np.float64]) -> NDArray[np.float64]:

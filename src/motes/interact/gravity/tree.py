@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.interact.gravity.morton import LEVELS, morton_order
-from motes.jit import blocks, jit, share
+from motes.interact.gravity.room import Room
+from motes.jit import Calls, each, jit
 
 START, END, FIRST, NUMBER = 0, 1, 2, 3
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
@@ -27,6 +28,14 @@ only, and expansions around its center hardly converge at its edge.
 FINER, LARGER = 1, 3
 """Levels from a usual leaf up to one that is much larger, and on to where each particle is alone:
 the ball around two of these would hold most others."""
+
+BRANCHES, LEAST = 64, 1024
+"""Parts into which particles are divided before the rest is divided in parallel, about, and
+particles of a part at least."""
+
+WINDOW, WINDOWS = 1024, 64
+"""Particles that are neighbours on the curve, and how many times as many are looked at to know the
+usual level of leaves."""
 
 
 class Tree(NamedTuple):
@@ -80,21 +89,35 @@ def _most(leaf: Any, level: Any, coarse: Any) -> Any:
 
 
 @jit(numba=False)
-def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
-    """Write the rows of all cells; return their number, or 0 if there is no room.
+def _divide(
+    key: Any, leaf: Any, coarse: Any, limit: Any, roots: Any, written: Any, table: Any,
+    branches: Any, which: Any,
+) -> None:  # fmt: skip
+    """Write the rows of a cell of `roots` and of what is under it.
+
+    `roots` (k, 4) are particles START to END, a level, and anything. Rows are written to a table
+    from row 2 START on; to `written` (k, 2) their number, and that of branches: cells of at most
+    `limit` particles, which are not divided, but written to `branches` (b, 4), with their row.
 
     Leaves have at most `leaf` particles, or FEW if they fill a cube of a level under `coarse`, or
     one if it is LARGER levels under that.
     """
+    root = roots[which]
+    cells = table[2 * root[0] : 2 * root[1]]
     stack, cuts = np.empty((8 * LEVELS + 1, 2), np.int64), np.empty(8, np.int64)
-    cells[0, START], cells[0, END] = 0, key.size
-    stack[0] = 0
-    depth, count = 1, 1
+    cells[0, START], cells[0, END] = root[0], root[1]
+    stack[0, 0], stack[0, 1] = 0, root[2]
+    depth, count, found = 1, 1, 0
     while depth > 0:
         depth -= 1
         cell, level = stack[depth]
         start, end = cells[cell, START], cells[cell, END]
         cells[cell, FIRST], cells[cell, NUMBER] = count, 0
+        if end - start <= limit:
+            branch = branches[found]
+            branch[0], branch[1], branch[2], branch[3] = start, end, level, cell
+            found += 1
+            continue
         if end - start == 1 or (end - start <= FEW and level + LARGER >= coarse):
             continue
         shift = np.uint64(3 * (LEVELS - 1 - level))
@@ -103,8 +126,6 @@ def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
             shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
         if level == LEVELS or end - start <= _most(leaf, level, coarse):
             continue
-        if count + 8 > cells.shape[0]:
-            return 0
         # From the last octant to the first.
         most = _most(leaf, level + 1, coarse)
         high, octant, number = end, np.uint64(8), 0
@@ -132,28 +153,59 @@ def _divide(key: Any, leaf: Any, coarse: Any, cells: Any) -> Any:
             stack[depth, 0], stack[depth, 1] = child, level + 1
             depth += 1
         count += number
-    return count
+    written[which, 0], written[which, 1] = count, found
 
 
 @jit(numba=False)
-def _permute(
-    points: Any, mass: Any, low: Any, length: Any, order: Any, place: Any, first: Any, last: Any
-) -> None:
-    for i in range(first, last):
-        k = order[i]
-        place[0, i] = (points[k, 0] - low[0]) / length
-        place[1, i] = (points[k, 1] - low[1]) / length
-        place[2, i] = (points[k, 2] - low[2]) / length
-        place[3, i] = mass[k]
+def _find_levels(key: Any, some: Any, cells: Any, counts: Any, levels: Any, k: Any) -> None:
+    """Count particles by the level of the cube around their leaf, but for leaves that are cut."""
+    first, last = some[k, 0], some[k, 1]
+    for cell in range(2 * first, 2 * first + counts[k, 0]):
+        start, end = cells[cell, START], cells[cell, END]
+        is_whole = (start > first or start == 0) and (end < last or end == key.size)
+        if cells[cell, NUMBER] == 0 and (is_whole or end - start == last - first):
+            level, shift = 0, np.uint64(3 * (LEVELS - 1))
+            while level < LEVELS and key[start] >> shift == key[end - 1] >> shift:
+                level += 1
+                shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
+            levels[k, level] += end - start
 
 
 @jit(numba=False)
-def unpermute(sums: Any, order: Any, result: Any, first: Any, last: Any) -> None:
-    """Write columns `first` to `last` of sums in the tree's order to rows where they came from."""
-    for i in range(first, last):
-        place = order[i]
-        for row in range(sums.shape[0]):
-            result[place, row] = sums[row, i]
+def _number(stem: Any, branches: Any, parts: Any, counts: Any, cells: Any, after: Any) -> None:
+    """Write the cells of the stem and the branches' own, in depth-first order, and where those
+    under each branch are to be."""
+    # Rows in the stem and in the end.
+    stack = np.empty((8 * LEVELS + 1, 2), np.int64)
+    stack[0] = 0
+    depth, count, branch = 1, 1, 0
+    while depth > 0:
+        depth -= 1
+        old, cell = stack[depth]
+        first, number = stem[old, FIRST], stem[old, NUMBER]
+        cells[cell, START], cells[cell, END] = stem[old, START], stem[old, END]
+        cells[cell, FIRST], cells[cell, NUMBER] = count, number
+        if branch < counts.shape[0] and branches[branch, 3] == old:
+            cells[cell, NUMBER] = parts[2 * branches[branch, 0], NUMBER]
+            after[branch] = count
+            count += counts[branch, 0] - 1
+            branch += 1
+            continue
+        for k in range(number):
+            child = number - 1 - k
+            stack[depth, 0], stack[depth, 1] = first + child, count + child
+            depth += 1
+        count += number
+
+
+@jit(numba=False)
+def _move_branch(branches: Any, parts: Any, counts: Any, after: Any, cells: Any, k: Any) -> None:
+    """Write the cells under a branch, which know each other's rows."""
+    start, shift = 2 * branches[k, 0], after[k] - 1
+    for i in range(1, counts[k, 0]):
+        old, new = parts[start + i], cells[shift + i]
+        new[START], new[END], new[NUMBER] = old[START], old[END], old[NUMBER]
+        new[FIRST] = old[FIRST] + shift
 
 
 @jit(inline=True)
@@ -172,28 +224,26 @@ class Box:
     """Edge, not 0."""
     length: float
     """Unit of length of the tree's coordinates, which are from the corner."""
+    mass: float = 1.0
+    """Unit of mass in the tree."""
 
 
-def octree(points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int) -> Tree:
+def octree(
+    points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int, room: Room | None = None
+) -> Tree:
     """Sort and divide particles (n, 3) with masses (n,) until no leaf has more than `leaf`.
 
-    Particles that share a key, closer than 2^-21 of the box, stay in one leaf.
+    Particles that share a key, closer than 2^-21 of the box, stay in one leaf. The pieces "records"
+    and "key" of the room are free again afterwards.
     """
-    key, order = morton_order(points, box.low, box.size)
-    n = len(key)
-    cells = _cells(key, leaf, 0)
-    cells = _cells(key, leaf, _usual_level(key, cells) - FINER)
-    place = np.empty((4, n))
-    ranges = blocks(n, 1 << 16)
-    share(
-        lambda k: _permute(points, mass, box.low, box.length, order, place, *ranges[k]),
-        len(ranges),
-    )
+    room = room or Room()
+    key, order, place = morton_order(points, mass, box.low, box.size, box.length, box.mass, room)
+    cells = _cells(key, leaf, room)
     nothing = np.empty((0, 0))
     return Tree(
         *_leaves(cells),
         cells,
-        np.empty((len(cells), 5)),
+        room.array("bodies", (len(cells), 5)),
         nothing,
         nothing,
         order,
@@ -203,47 +253,52 @@ def octree(points: NDArray[Any], mass: NDArray[np.float64], box: Box, leaf: int)
     )
 
 
-def _cells(key: NDArray[np.uint64], leaf: int, coarse: int) -> NDArray[np.int32]:
-    capacity, count = 64 + 4 * len(key) // leaf, 0
-    while not count:
-        capacity *= 2
-        cells: NDArray[np.int32] = np.empty((capacity, 4), np.int32)
-        count = _divide(key, leaf, coarse, cells)
-    return cells[:count].copy()
+def _cells(key: NDArray[np.uint64], leaf: int, room: Room) -> NDArray[np.int32]:
+    """All cells: those above the branches, then what is in each of these, then put together."""
+    n = len(key)
+    limit = max(n // BRANCHES, leaf, LEAST)
+    # An inner cell has more particles than one of its children, and at least two of these.
+    parts = room.array("records", (2 * n, 4), np.int32)
+    most = 8 * LEVELS * (n // limit) + 1
+    stem, branches = np.empty((most, 4), np.int32), np.empty((most, 4), np.int64)
+    coarse = _usual_level(key, leaf, parts) - FINER
+    root = np.array([[0, n, 0, 0]])
+    counts = np.empty((most, 2), np.int64)
+    _divide(key, leaf, coarse, limit, root, counts, stem, branches, 0)
+    count, found = counts[0]
+    branches, counts, nothing = branches[:found], counts[:found], branches[:0]
+    each(_divide, (key, leaf, coarse, 0, branches, counts, parts, nothing), _each_of(found))
+    count += counts[:, 0].sum() - found
+    cells: NDArray[np.int32] = room.array("cells", (int(count), 4), np.int32)
+    after = np.empty(found, np.int64)
+    _number(stem, branches, parts, counts, cells, after)
+    each(_move_branch, (branches, parts, counts, after, cells), _each_of(found))
+    return cells
+
+
+def _usual_level(key: NDArray[np.uint64], leaf: int, parts: NDArray[np.int32]) -> int:
+    """Level of the cube around the leaf of the median particle, leaves sorted by that.
+
+    Of many particles, some here and there are divided to know it.
+    """
+    n = len(key)
+    number = min(max(n // WINDOW, 1), WINDOWS)
+    starts = np.arange(number) * n // number
+    ends = starts + WINDOW if number > 1 else np.array([n])
+    some = np.stack([starts, ends, 0 * starts, 0 * starts], axis=1)
+    counts, levels = np.empty((number, 2), np.int64), np.zeros((number, LEVELS + 1), np.int64)
+    each(_divide, (key, leaf, 0, 0, some, counts, parts, some[:0]), _each_of(number))
+    each(_find_levels, (key, some, parts, counts, levels), _each_of(number))
+    particles = levels.sum(axis=0)
+    return int(np.searchsorted(2 * np.cumsum(particles), particles.sum()))
+
+
+def _each_of(number: int) -> Calls:
+    return Calls([(k,) for k in range(number)], alike=True)
 
 
 def _leaves(cells: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
     """Rows of the leaves, and the most particles in one."""
-    found = np.empty(len(cells), np.int32)
-    count, largest = _find_leaves(cells, found)
-    return found[:count], largest
-
-
-@jit(numba=False)
-def _find_leaves(cells: Any, found: Any) -> Any:
-    count, largest = 0, 0
-    for cell in range(cells.shape[0]):
-        if cells[cell, NUMBER] == 0:
-            found[count] = cell
-            count += 1
-            largest = max(largest, cells[cell, END] - cells[cell, START])
-    return count, largest
-
-
-@jit(numba=False)
-def _usual_level(key: Any, cells: Any) -> Any:
-    """Level of the cube around the leaf of the median particle, leaves sorted by that."""
-    particles = np.zeros(LEVELS + 1, np.int64)
-    for cell in range(cells.shape[0]):
-        if cells[cell, NUMBER] == 0:
-            start, end = cells[cell, START], cells[cell, END]
-            level, shift = 0, np.uint64(3 * (LEVELS - 1))
-            while level < LEVELS and key[start] >> shift == key[end - 1] >> shift:
-                level += 1
-                shift = np.uint64(3 * (LEVELS - 1 - level)) if level < LEVELS else np.uint64(0)
-            particles[level] += end - start
-    level, below = 0, particles[0]
-    while 2 * below < key.size:
-        level += 1
-        below += particles[level]
-    return level
+    leaves = np.flatnonzero(cells[:, NUMBER] == 0).astype(np.int32)
+    rows = cells[leaves]
+    return leaves, int((rows[:, END] - rows[:, START]).max())

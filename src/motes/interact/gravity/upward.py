@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from motes.interact.gravity.lanes import LANES, maximum, read, spread, write
 from motes.interact.gravity.morton import LEVELS
+from motes.interact.gravity.room import Room
 from motes.interact.gravity.translations import padded, translations
 from motes.interact.gravity.tree import (
     BALL_RADIUS,
@@ -32,14 +34,18 @@ from motes.interact.gravity.tree import (
     Z,
     cell_unit,
 )
-from motes.jit import EXACT, jit, share
+from motes.jit import EXACT, each, jit
 from motes.machine.lanes import choose, largest, total
 
-TASKS = 64
-"""Parts of the upward pass."""
+TASKS, PARTICLES_OF_A_TASK = 64, 4096
+"""Parts of the upward pass, at most, and particles of a part at least."""
 
 NOTHING = (8.0, 8.0, 8.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 """A ball without mass, outside of the box: what lanes that are left over are about."""
+
+MANY = 500
+"""Most particles of a cell with children whose ball is the smallest around its center of mass. A
+larger one follows from its children's balls: it may be too large, which makes errors smaller."""
 
 LIGHT = 1e-30
 """Weight of massless particles in a center, where the masses of all are about 1."""
@@ -51,7 +57,7 @@ def _measurer(order: int) -> Callable[..., None]:
     squares = (order + 1) // 2
     root = 0.5 / squares
 
-    @jit(inline=True)
+    @jit(inline=True, flags=EXACT)
     def raised(square: Any) -> Any:
         """s^q from s^2."""
         power = square
@@ -59,20 +65,31 @@ def _measurer(order: int) -> Callable[..., None]:
             power = power * square
         return power
 
-    @jit(numba=False)
+    @jit(flags=EXACT, numba=False)
     def measure(tree: Tree, cell: Any) -> None:
         cells, bodies, place = tree.cells, tree.bodies, tree.place
         start, end, first_child, number = cells[cell]
+        xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
+        ms = place[3, start:end]
+        whole = xs.size // LANES * LANES
         x = y = z = mass = 0.0
-        weights = LIGHT * (end - start)
         if number == 0:
-            for i in range(start, end):
-                m = place[3, i]
+            sum_x, sum_y, sum_z, sum_m = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
+            for i in range(0, whole, LANES):
+                m = read(ms, i)
+                weight = m + LIGHT
+                sum_m = sum_m + m
+                sum_x = sum_x + weight * read(xs, i)
+                sum_y = sum_y + weight * read(ys, i)
+                sum_z = sum_z + weight * read(zs, i)
+            x, y, z, mass = total(sum_x), total(sum_y), total(sum_z), total(sum_m)
+            for i in range(whole, xs.size):
+                m = ms[i]
                 mass += m
                 m += LIGHT
-                x += m * place[0, i]
-                y += m * place[1, i]
-                z += m * place[2, i]
+                x += m * xs[i]
+                y += m * ys[i]
+                z += m * zs[i]
         else:
             for child in range(first_child, first_child + number):
                 m = bodies[child, MASS]
@@ -81,24 +98,30 @@ def _measurer(order: int) -> Callable[..., None]:
                 x += m * bodies[child, X]
                 y += m * bodies[child, Y]
                 z += m * bodies[child, Z]
-        weights += mass
+        weights = mass + LIGHT * (end - start)
         x, y, z = x / weights, y / weights, z / weights
-        xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
-        ms = place[3, start:end]
-        whole = xs.size // LANES * LANES
-        far, sums, r2, spread_out = spread(0.0), spread(0.0), 0.0, 0.0
-        for i in range(0, whole, LANES):
-            dx, dy, dz = read(xs, i) - x, read(ys, i) - y, read(zs, i) - z
-            s2 = dx * dx + dy * dy + dz * dz
-            far = maximum(s2, far)
-            sums = sums + read(ms, i) * raised(s2)
-        for i in range(whole, xs.size):
-            dx, dy, dz = xs[i] - x, ys[i] - y, zs[i] - z
-            s2 = dx * dx + dy * dy + dz * dz
-            r2 = max(r2, s2)
-            spread_out += ms[i] * raised(s2)
-        radius = np.sqrt(max(r2, largest(far)))
-        spread_out += total(sums)
+        r2, radius, spread_out = 0.0, 0.0, 0.0
+        if number == 0 or end - start <= MANY:
+            far, sums = spread(0.0), spread(0.0)
+            for i in range(0, whole, LANES):
+                dx, dy, dz = read(xs, i) - x, read(ys, i) - y, read(zs, i) - z
+                s2 = dx * dx + dy * dy + dz * dz
+                far = maximum(s2, far)
+                sums = sums + read(ms, i) * raised(s2)
+            for i in range(whole, xs.size):
+                dx, dy, dz = xs[i] - x, ys[i] - y, zs[i] - z
+                s2 = dx * dx + dy * dy + dz * dz
+                r2 = max(r2, s2)
+                spread_out += ms[i] * raised(s2)
+            radius = np.sqrt(max(r2, largest(far)))
+            spread_out += total(sums)
+        else:
+            for child in range(first_child, first_child + number):
+                dx, dy, dz = bodies[child, X] - x, bodies[child, Y] - y, bodies[child, Z] - z
+                away = np.sqrt(dx * dx + dy * dy + dz * dz)
+                radius = max(radius, away + bodies[child, RADIUS])
+                at_most = away + tree.balls[child, SPREAD]
+                spread_out += bodies[child, MASS] * raised(at_most * at_most)
         bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
         bodies[cell, RADIUS], bodies[cell, MASS] = radius, mass
         ball, content = tree.balls[cell], tree.contents[cell]
@@ -129,15 +152,16 @@ def _approach(tree: Tree, cell: Any, relative: bool) -> None:
 
 @cache
 def _summation(order: int, harmonic: bool) -> Callable[..., None]:
-    """Compiled function that fills in bodies, near and moments of cells in ranges (k, 2).
+    """Compiled function that fills in bodies, near and moments of some branches.
 
-    (tree, ranges, relative, place, chosen, ascending, sums) -> None; the last cell of a range is
-    the first.
+    (tree, branches, relative, ascending, first, last) -> None: `branches` (k, 2) from `first` to
+    `last`, each a cell and the row after the last of its descendants.
     """
     operations = translations(order, harmonic)
     particles_to_moments = operations.particles_to_moments
     sums_to_moments = operations.sums_to_moments
-    moments_to_moments, measure = operations.moments_to_moments, _measurer(order)
+    moments_to_moments, every = operations.moments_to_moments, operations.every
+    measure = _measurer(order)
 
     @jit(flags=EXACT, numba=False)
     def moments_of_leaf(
@@ -178,12 +202,17 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
 
     @jit(flags=EXACT, numba=False)
     def fill(
-        tree: Tree, ranges: Any, relative: bool, place: Any, chosen: Any, ascending: Any, sums: Any
+        tree: Tree, branches: Any, relative: bool, ascending: Any, first: Any, last: Any
     ) -> None:
-        for some in range(ranges.shape[0]):
-            first, last = ranges[some, 0], ranges[some, 1]
-            for back in range(last - first):
-                cell = last - 1 - back
+        kind = tree.near.dtype.type
+        place, sums = np.empty((5, LANES), kind), np.empty((every, LANES), kind)
+        chosen = np.zeros(LANES, np.int32)
+        place[:] = 1
+        for branch in range(first, last):
+            top, end = branches[branch, 0], branches[branch, 1]
+            under = end - tree.cells[top, FIRST]
+            for k in range(under + 1):
+                cell = end - 1 - k if k < under else top
                 is_leaf = tree.cells[cell, NUMBER] == 0
                 measure(tree, cell)
                 if is_leaf:
@@ -199,40 +228,32 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
     return fill  # type: ignore[no-any-return]
 
 
-def summarize(tree: Tree, order: int, harmonic: bool, real: type, sources: bool) -> Tree:
+def summarize(
+    tree: Tree, order: int, harmonic: bool, real: type, sources: bool, room: Room | None = None
+) -> Tree:
     """The tree with bodies, and for `sources` moments, filled in from places and masses."""
+    room = room or Room()
     branches, stem = divide_work(tree)
     operations, fill = translations(order, harmonic), _summation(order, harmonic)
-    count = len(tree.cells) + 1 if sources else 0
-    near: NDArray[Any] = np.empty((4, tree.place.shape[1] + LANES), real)
+    n, rows = tree.place.shape[1], len(tree.cells) + LANES
+    near = room.array("records", (4, n + LANES), real)
     near[:, -LANES:] = 0
-    balls: NDArray[Any] = np.empty((len(tree.cells) + LANES, 8), real)
+    balls = room.array("balls", (rows, 8), real)
     balls[-LANES:] = NOTHING
-    contents: NDArray[Any] = np.empty((len(tree.cells) + LANES, 4), real)
+    contents = room.array("contents", (rows, 4), real)
     contents[-LANES:] = 0
-    moments: NDArray[Any] = np.empty((count, padded(operations.basis)), real)
+    count = len(tree.cells) + 1 if sources else 0
+    moments = room.array("moments", (count, padded(operations.basis)), real)
     moments[-1:] = 0  # Of rows that lanes which are left over are about.
-    ascending = np.arange(LANES, dtype=np.int32)
     tree = tree._replace(moments=moments, near=near, balls=balls, contents=contents)
-
-    def cells(ranges: Any) -> None:
-        place: NDArray[Any] = np.ones((5, LANES), real)
-        sums: NDArray[Any] = np.empty((operations.every, LANES), real)
-        chosen = np.zeros(LANES, np.int32)
-        given = np.asarray(ranges, np.int64).reshape(-1, 2)
-        fill(tree, given, real is np.float32, place, chosen, ascending, sums)
-
-    tasks = np.array_split(branches, min(len(branches), TASKS))
-
-    def branch(k: int) -> None:
-        some = tasks[k]
-        ranges = np.empty((len(some), 2, 2), np.int64)
-        ranges[:, 0, 0], ranges[:, 0, 1] = tree.cells[some[:, 0], FIRST], some[:, 1]
-        ranges[:, 1, 0], ranges[:, 1, 1] = some[:, 0], some[:, 0] + 1
-        cells(ranges)
-
-    share(branch, len(tasks))
-    cells([(cell, cell + 1) for cell in stem[::-1]])
+    relative, ascending = real is np.float32, np.arange(LANES, dtype=np.int32)
+    tasks = min(max(n // PARTICLES_OF_A_TASK, 1), TASKS)
+    cuts = np.searchsorted(tree.cells[branches[:, 0], START], np.arange(tasks + 1) * n / tasks)
+    parts = [(int(a), int(b)) for a, b in pairwise(cuts) if a < b]
+    each(fill, (tree, branches, relative, ascending), parts)
+    # The cells above have nothing under them that is not filled in.
+    alone = np.stack([stem, tree.cells[stem, FIRST]], axis=1)[::-1].copy()
+    fill(tree, alone, relative, ascending, 0, len(alone))
     return tree
 
 
