@@ -101,7 +101,7 @@ def cells() -> None:
     mass = np.full(len(x), 1 / len(x))
     tree = Problem.build(x, mass, None, box, "newton", 0.0, False, plan).sources
     leaves = np.flatnonzero(tree.cells[:, NUMBER] == 0)
-    here = np.array([2.1, 1.4, 0.0]) - box.low
+    here = np.array([2.1, 1.4, 0.0]) - box.origin
     leaf = int(leaves[np.argmin(((tree.bodies[leaves, :3] - here) ** 2).sum(axis=1))])
     far, near = met(tree, leaf)
     patches, counts = [], []

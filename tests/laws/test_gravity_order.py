@@ -47,7 +47,7 @@ def test_the_order_is_that_of_keys_then_rows(n, name):
     x, m = clouds(n)[name], np.random.default_rng(2).random(n)
     key = keys(x)
     order = np.argsort(key, kind="stable")
-    found = morton.morton_order(x, m, LOW, SIZE, 2.0, 0.5, Room())
+    found = morton.morton_order(x, m, LOW, SIZE, LOW, 2.0, 0.5, Room())
     np.testing.assert_array_equal(found.order, order)
     np.testing.assert_array_equal(found.key, key[order])
     np.testing.assert_array_equal(found.place, [*((x - LOW) / 2)[order].T, m[order] / 0.5])

@@ -95,15 +95,15 @@ def _find_parts(key: Any, splitters: Any, steps: Any, part: Any, counts: Any) ->
 
 @jit(numba=False)
 def _scatter(
-    points: Any, mass: Any, low: Any, length: Any, unit: Any, key: Any, part: Any, first: Any,
+    points: Any, mass: Any, origin: Any, length: Any, unit: Any, key: Any, part: Any, first: Any,
     to: Any, body: Any, tag: Any,
 ) -> None:  # fmt: skip
     """Write rows from `first` on, (x, y, z, m) and (key, row), to their parts."""
     for i in range(key.size):
         k, at = first + i, to[part[i]]
-        body[at, 0] = (points[k, 0] - low[0]) / length
-        body[at, 1] = (points[k, 1] - low[1]) / length
-        body[at, 2] = (points[k, 2] - low[2]) / length
+        body[at, 0] = (points[k, 0] - origin[0]) / length
+        body[at, 1] = (points[k, 1] - origin[1]) / length
+        body[at, 2] = (points[k, 2] - origin[2]) / length
         body[at, 3] = mass[k] / unit
         tag[at, 4] = key[i]
         tag[at, 5] = np.uint64(k)
@@ -192,13 +192,14 @@ def morton_order(
     mass: NDArray[np.float64],
     low: NDArray[np.float64],
     size: float,
+    origin: NDArray[np.float64],
     length: float,
     unit: float,
     room: Room,
 ) -> Sorted:
     """Points (n, 3) with masses (n,) in Morton order, in a cube of edge `size` with a corner `low`.
 
-    `length` and `unit` are what lengths and masses are measured in. The pieces "records" and
+    Places are from `origin`; `length` and `unit` are what they and masses are measured in. The pieces "records" and
     "marks" of the room are free again afterwards.
     """
     n, scale = len(points), (1 << LEVELS) / size * (1 - 2.0**-40)
@@ -227,7 +228,7 @@ def morton_order(
     def scatter(block: int) -> None:
         rows = slice(cuts[block], cuts[block + 1])
         _scatter(
-            points, mass, low, length, unit, key[rows], part[rows], cuts[block],
+            points, mass, origin, length, unit, key[rows], part[rows], cuts[block],
             to[block], body, tag,
         )  # fmt: skip
 

@@ -223,9 +223,19 @@ class Box:
     size: float
     """Edge, not 0."""
     length: float
-    """Unit of length of the tree's coordinates, which are from the corner."""
+    """Unit of length of the tree's coordinates."""
     mass: float = 1.0
     """Unit of mass in the tree."""
+
+    @property
+    def origin(self) -> NDArray[np.float64]:
+        """(3,) where the tree's coordinates are 0, such that differences from there are exact.
+
+        That is the corner where all coordinates are at most twice it or it at most twice them
+        (Sterbenz, Floating-point computation, 1974, theorem 4.3.1), and 0 where the cube is nearer.
+        """
+        is_far = (self.low >= self.size) | (self.low <= -2 * self.size)
+        return np.where(is_far, self.low, 0.0)
 
 
 def octree(
@@ -237,7 +247,8 @@ def octree(
     and "key" of the room are free again afterwards.
     """
     room = room or Room()
-    key, order, place = morton_order(points, mass, box.low, box.size, box.length, box.mass, room)
+    units = box.origin, box.length, box.mass
+    key, order, place = morton_order(points, mass, box.low, box.size, *units, room)
     cells = _cells(key, leaf, room)
     nothing = np.empty((0, 0))
     return Tree(
