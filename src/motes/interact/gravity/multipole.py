@@ -36,7 +36,7 @@ SINGLE_FROM = 4e-6
 SAFETY = 0.85
 """Part of the tolerance that the likely error may use, as seen on the sample."""
 
-FIRST, MOST = 5.0, 8.0
+FIRST, MOST = 4.0, 8.0
 """What one expansion may neglect, in tolerances: at first, and at most, as single large errors
 would be missed by the sample."""
 
@@ -217,7 +217,7 @@ class Problem:
                 exact = self._at(sample, strict)
             part = self._error(sample, self._at(sample, limits), exact) / (SAFETY * tolerance)
             if part <= 1.0:
-                if kept is not None or part > 0.6 or share >= MOST * tolerance:
+                if kept is not None or part > 0.5 or share >= MOST * tolerance:
                     return limits
                 kept = limits
             elif kept is not None:
