@@ -234,6 +234,14 @@ def test_moments_of_every_cell_are_the_sums_over_its_particles(harmonic):
         np.testing.assert_allclose(found, exact, rtol=1e-10, atol=1e-10 * np.abs(exact).max())
 
 
+@pytest.mark.parametrize("exponent", [-1030, 900])
+def test_masses_may_be_near_the_ends_of_the_numbers(exponent):
+    x, m = plummer_sphere(500)
+    exact, unit = gravity.acceleration(x, m), 2.0**exponent
+    a = gravity.acceleration(x, m * unit, tolerance=1e-3, method="multipole")
+    assert relative(a / unit, exact) < 1e-3
+
+
 @pytest.mark.parametrize("name", ["plummer", "two clusters"])
 def test_balls_of_large_cells_hold_all_that_is_in_them(name):
     """Radius and spread of a cell of many particles are its own or somewhat larger."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.interact.gravity.room import Room
-from motes.jit import each, jit, share
+from motes.jit import EXACT, each, jit, share
 
 LEVELS = 21
 """Levels of an octree that fit into a key: bits for each of x, y, z."""
@@ -93,12 +93,15 @@ def _find_parts(key: Any, splitters: Any, steps: Any, part: Any, counts: Any) ->
         counts[node - parts] += 1
 
 
-@jit(numba=False)
+@jit(flags=EXACT, numba=False)
 def _scatter(
     points: Any, mass: Any, origin: Any, length: Any, unit: Any, key: Any, part: Any, first: Any,
     to: Any, body: Any, tag: Any,
 ) -> None:  # fmt: skip
-    """Write rows from `first` on, (x, y, z, m) and (key, row), to their parts."""
+    """Write rows from `first` on, (x, y, z, m) and (key, row), to their parts.
+
+    Divided, as one over a unit may be infinite.
+    """
     for i in range(key.size):
         k, at = first + i, to[part[i]]
         body[at, 0] = (points[k, 0] - origin[0]) / length
