@@ -202,8 +202,8 @@ def morton_order(
 ) -> Sorted:
     """Points (n, 3) with masses (n,) in Morton order, in a cube of edge `size` with a corner `low`.
 
-    Places are from `origin`; `length` and `unit` are what they and masses are measured in. The pieces "records" and
-    "marks" of the room are free again afterwards.
+    Places are from `origin`; `length` and `unit` are what they and masses are measured in. The
+    pieces "records" and "marks" of the room are free again afterwards.
     """
     n, scale = len(points), (1 << LEVELS) / size * (1 - 2.0**-40)
     steps = min(max(n // _PART, 1), _PARTS).bit_length() - 1
