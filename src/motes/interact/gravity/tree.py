@@ -311,5 +311,4 @@ def _each_of(number: int) -> Calls:
 def _leaves(cells: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
     """Rows of the leaves, and the most particles in one."""
     leaves = np.flatnonzero(cells[:, NUMBER] == 0).astype(np.int32)
-    rows = cells[leaves]
-    return leaves, int((rows[:, END] - rows[:, START]).max())
+    return leaves, int((cells[leaves, END] - cells[leaves, START]).max())
