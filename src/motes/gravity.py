@@ -33,6 +33,9 @@ SOFTENINGS = ("spline", "plummer")
 TIGHTEST = {"single": 1e-6, "double": 1e-10}
 """Smallest tolerance by the precision of the positions."""
 
+WIDER = '; give x as float64, in a scene precision = "double".'
+"""Remedy for a tolerance that only doubles can keep."""
+
 FARTHEST = 1e150
 """Edge of the largest cube around positions, whose square is still a number."""
 
@@ -260,7 +263,7 @@ def _tolerance(tolerance: float | None, method: str, dtype: np.dtype[Any]) -> fl
         raise ValueError(
             f"tolerance = {number:g} must be below 1 and at least {least:g} for positions in "
             f"{precision} precision"
-            + ("; give x as float64." if TIGHTEST["double"] <= number < least else ".")
+            + (WIDER if TIGHTEST["double"] <= number < least else ".")
         )
     return number
 
