@@ -1,7 +1,7 @@
 """Plot gravity to docs/pictures: python3 docs/gravity_plots.py [NAME].
 
-`gravity_cells`: what one target meets; `gravity_cost`: seconds over n; `gravity_plummer`: what stays
-in a Plummer sphere. Needs matplotlib; takes about a minute.
+`gravity_cells`: what one target meets; `gravity_cost`: seconds over n; `gravity_plummer`: what
+stays in a Plummer sphere. Needs matplotlib; takes one or two minutes.
 """
 
 from __future__ import annotations

@@ -262,8 +262,7 @@ def _tolerance(tolerance: float | None, method: str, dtype: np.dtype[Any]) -> fl
     if not least <= number < 1.0:
         raise ValueError(
             f"tolerance = {number:g} must be below 1 and at least {least:g} for positions in "
-            f"{precision} precision"
-            + (WIDER if TIGHTEST["double"] <= number < least else ".")
+            f"{precision} precision" + (WIDER if TIGHTEST["double"] <= number < least else ".")
         )
     return number
 

@@ -215,13 +215,13 @@ def test_the_scanner_finds_every_value_of_any_file(tree: dict[str, Any]) -> None
 @pytest.mark.parametrize("key", ["systems", "sources"])
 def test_a_system_that_there_is_not_is_reported_where_it_is_named(key: str) -> None:
     """Reading finds it, so that `motes check` does."""
-    text = f'''[[interact]]
+    text = f"""[[interact]]
 type = "gravity"
 {key} = ["suns"]
 
 [[system]]
 name = "sun"
-'''
+"""
     (found,) = problems(text)
     assert found.line == 3
     assert found.message == (

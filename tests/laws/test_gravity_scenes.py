@@ -74,7 +74,7 @@ def test_tracers_are_pulled_and_do_not_pull() -> None:
 def test_a_tolerance_that_single_precision_cannot_keep_is_a_line_with_the_remedy() -> None:
     star = body("star", 1.0, (0, 0, 0), (0, 0, 0))
     fine = [motes.interact.Gravity(tolerance=1e-8)]
-    with pytest.raises(motes.SimulationError, match='at least 1e-06 .* precision = "double"'):
+    with pytest.raises(motes.SimulationError, match=r'at least 1e-06 .* precision = "double"'):
         simulation(star, interact=fine, precision="single").run(steps=1)
     simulation(star, interact=fine).run(steps=1)
 

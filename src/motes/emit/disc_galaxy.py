@@ -58,8 +58,8 @@ class DiscGalaxy:
     """Standard deviation of the distance from the plane, as a share of the radius."""
 
     dispersion: Number = quantity(0.0, "", at_least=0)
-    """Standard deviation of the radial speed, as a share of the circular speed. A disc that pulls on
-    itself is stable where Toomre's Q = sigma_R kappa / (3.36 G Sigma) is above 1."""
+    """Standard deviation of the radial speed, as a share of the circular speed. A disc that pulls
+    on itself is stable where Toomre's Q = sigma_R kappa / (3.36 G Sigma) is above 1."""
 
     draws = 6
 
