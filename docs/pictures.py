@@ -30,7 +30,7 @@ INSTANTS = {
     "evacuation": 0.3,
     "fireworks": 0.75,
     "fountain": 0.9,
-    "galaxy_collision": 0.46,
+    "galaxy_collision": 0.42,
     "granular": 0.65,
     "lj_melting": 0.3,
     "lj_splash": 0.67,
