@@ -1,7 +1,7 @@
-"""Plot the cells and the cost of gravity to docs/pictures: python3 docs/gravity_plots.py [NAME].
+"""Plot gravity to docs/pictures: python3 docs/gravity_plots.py [NAME].
 
-`gravity_cells`: what one target meets; `gravity_cost`: seconds over n. Needs matplotlib; takes
-about a minute.
+`gravity_cells`: what one target meets; `gravity_cost`: seconds over n; `gravity_plummer`: what
+stays in a Plummer sphere. Needs matplotlib; takes one or two minutes.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 from matplotlib.collections import PatchCollection
 from matplotlib.patches import Rectangle
 
+import motes
 from motes import gravity
 from motes.interact.gravity.acceptance import acceptance
 from motes.interact.gravity.lanes import LANES, read, write
@@ -31,6 +32,9 @@ from motes.machine.lanes import choose
 FOLDER = Path(__file__).resolve().parent / "pictures"
 ORDER, LEAF, ALLOWED = 5, 24, 2e-3
 NIGHT, INK = "#0b0e17", "#e8e6df"
+MANY = [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000]
+PARTS = (10, 25, 50, 75, 90)
+TINTS = ("#7db4ff", "#7fd6c2", "#e8e6df", "#ffc27a", "#ff8a5c")
 
 
 def disc(n: int) -> Any:
@@ -132,27 +136,83 @@ def cells() -> None:
 
 def cost() -> None:
     """Seconds over n: all pairs, and expansions at two tolerances."""
-    figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
-    kinds: dict[str, tuple[float | None, list[int]]] = {
-        "all pairs, single precision": (None, [1_000, 3_000, 10_000, 30_000, 100_000]),
-        "tolerance 1e-3": (1e-3, [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000]),
-        "tolerance 1e-5": (1e-5, [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000]),
+    figure, (axes,) = night(1, (9, 5.2))
+    kinds: dict[str, tuple[float | None, str, list[int]]] = {
+        "all pairs": (None, "#ff8a5c", [1_000, 3_000, 10_000, 30_000, 100_000]),
+        "tolerance 1e-5": (1e-5, "#7fd6c2", MANY),
+        "tolerance 1e-3": (1e-3, "#7db4ff", MANY),
     }
-    for label, (tolerance, sizes) in kinds.items():
+    for label, (tolerance, color, sizes) in kinds.items():
         rows = []
         for n in sizes:
             x = np.random.default_rng(0).normal(size=(n, 3)).astype(np.float32)
             m = np.full(n, 1 / n)
             method = "direct" if tolerance is None else "multipole"
             rows.append((n, seconds(x, m, tolerance, method)))
-        axes.loglog(*np.transpose(rows), "o-", label=label)
-        slope = 2 if tolerance is None else 1
+        axes.loglog(*np.transpose(rows), "o-", color=color, markersize=5)
+        slope, power = (2, "n²") if tolerance is None else (1, "n")
         n, last = rows[-1]
-        axes.plot(sizes, [last * (k / n) ** slope for k in sizes], "k:", linewidth=0.8)
-    axes.set(xlabel="particles", ylabel="seconds (dotted: n² and n)")
-    axes.legend()
-    axes.grid(alpha=0.2)
-    figure.savefig(FOLDER / "gravity_cost.png", dpi=90)
+        long = MANY if tolerance is None else sizes
+        axes.plot(long, [last * (k / n) ** slope for k in long], ":", color=color, linewidth=1)
+        axes.annotate(label, (n, last), (9, -4), textcoords="offset points", color=color)
+        axes.annotate(
+            power, (long[0], last * (long[0] / n) ** slope), (-5, -4), ha="right",
+            textcoords="offset points", color=color,
+        )  # fmt: skip
+    axes.set(xlabel="particles", ylabel="seconds for all accelerations", xlim=(550, 6e6))
+    axes.set_title("Gravity of n bodies in single precision", color=INK, loc="left")
+    figure.savefig(FOLDER / "gravity_cost.png", dpi=100)
+
+
+def plummer() -> None:
+    """What stays in the gallery's Plummer sphere: radii, the virial ratio, the energy."""
+    simulation = motes.Simulation(motes.load("plummer"))
+    rows = []
+    for frame in simulation.frames():
+        if frame.index % 4 == 1:
+            now = simulation.measure()
+            r = np.linalg.norm(frame.systems["stars"]["position"] - now.center, axis=1)
+            rows.append((now.time, now.virial_ratio, now.energy, *np.percentile(r, PARTS)))
+    time, ratio, energy, *radii = np.transpose(rows)
+    figure, (left, middle, right) = night(3, (13, 4))
+    inside = (1 + 1 / float(simulation.scene.systems[0].emit[0].cutoff) ** 2) ** -1.5
+    for part, radius, color in zip(PARTS, radii, TINTS, strict=True):
+        left.semilogy(time, radius, color=color)
+        left.axhline((((part / 100 * inside) ** (-2 / 3)) - 1) ** -0.5, color=color, ls=":", lw=1)
+        left.annotate(
+            f"{part} %", (time[-1], radius[-1]), (5, -4), textcoords="offset points", color=color
+        )
+    left.set_title("radii with a share of the mass inside", color=INK, loc="left")
+    left.minorticks_off()
+    left.set(yticks=[0.5, 1, 2, 4], yticklabels=["0.5", "1", "2", "4"], ylim=(0.42, 4.6))
+    left.margins(x=0.12)
+    middle.plot(time, ratio, color="#7db4ff")
+    middle.axhline(1.0, color=INK, ls=":", lw=1)
+    middle.set_ylim(0.9, 1.1)
+    middle.set_title("virial ratio 2T / |U|", color=INK, loc="left")
+    right.plot(time, 1e4 * (energy / energy[0] - 1), color="#7fd6c2")
+    right.axhline(0.0, color=INK, ls=":", lw=1)
+    right.set_title("change of energy, in 1/10 000 of it", color=INK, loc="left")
+    for axes in (left, middle, right):
+        axes.set_xlabel("dynamical times √(a³ / GM)")
+    figure.savefig(FOLDER / "gravity_plummer.png", dpi=80)
+
+
+def night(count: int, size: tuple[float, float]) -> tuple[Any, list[Any]]:
+    """A figure with axes side by side, bright on dark."""
+    figure, axes = plt.subplots(1, count, figsize=size, facecolor=NIGHT, layout="constrained")
+    found = [axes] if count == 1 else list(axes)
+    for one in found:
+        one.set_facecolor(NIGHT)
+        one.tick_params(colors=INK, which="both")
+        one.xaxis.label.set_color(INK)
+        one.yaxis.label.set_color(INK)
+        one.grid(alpha=0.13, color=INK)
+        for side, spine in one.spines.items():
+            spine.set_color(INK)
+            spine.set_alpha(0.5)
+            spine.set_visible(side in ("left", "bottom"))
+    return figure, found
 
 
 def seconds(x: Any, m: Any, tolerance: float | None, method: str) -> float:
@@ -167,6 +227,6 @@ def seconds(x: Any, m: Any, tolerance: float | None, method: str) -> float:
 
 if __name__ == "__main__":
     FOLDER.mkdir(exist_ok=True)
-    plots = {"gravity_cells": cells, "gravity_cost": cost}
+    plots = {"gravity_cells": cells, "gravity_cost": cost, "gravity_plummer": plummer}
     for name in sys.argv[1:] or plots:
         plots[name]()

@@ -26,15 +26,17 @@ INSTANT = 0.6
 
 INSTANTS = {
     "battle": 0.8,
-    "cluster": 0.25,
+    "cluster": 0.13,
     "evacuation": 0.3,
     "fireworks": 0.75,
     "fountain": 0.9,
+    "galaxy_collision": 0.42,
     "granular": 0.65,
     "lj_melting": 0.3,
     "lj_splash": 0.67,
     "plummer": 0.1,
-    "ring": 0.4,
+    "ring": 0.5,
+    "solar_system": 0.35,
 }
 """Shares for scenes that are better seen at another time."""
 

@@ -32,6 +32,9 @@ SOFTENINGS = ("spline", "plummer")
 TIGHTEST = {"single": 1e-6, "double": 1e-10}
 """Smallest tolerance by the precision of the positions."""
 
+WIDER = '; give x as float64, in a scene precision = "double".'
+"""Remedy for a tolerance that only doubles can keep."""
+
 FARTHEST = 1e150
 """Edge of the largest cube around positions, whose square is still a number."""
 
@@ -267,8 +270,7 @@ def _tolerance(tolerance: float | None, method: str, dtype: np.dtype[Any]) -> fl
     if not least <= number < 1.0:
         raise ValueError(
             f"tolerance = {number:g} must be below 1 and at least {least:g} for positions in "
-            f"{precision} precision"
-            + ("; give x as float64." if TIGHTEST["double"] <= number < least else ".")
+            f"{precision} precision" + (WIDER if TIGHTEST["double"] <= number < least else ".")
         )
     return number
 

@@ -210,3 +210,20 @@ def test_the_scanner_finds_every_value_of_any_file(tree: dict[str, Any]) -> None
     for text, lines in ((as_json, json_lines(as_json)[0]), (as_toml, toml_lines(as_toml))):
         for path, value in leaves(document):
             assert lines[path] == text[: text.index(str(value))].count("\n") + 1
+
+
+@pytest.mark.parametrize("key", ["systems", "sources"])
+def test_a_system_that_there_is_not_is_reported_where_it_is_named(key: str) -> None:
+    """Reading finds it, so that `motes check` does."""
+    text = f"""[[interact]]
+type = "gravity"
+{key} = ["suns"]
+
+[[system]]
+name = "sun"
+"""
+    (found,) = problems(text)
+    assert found.line == 3
+    assert found.message == (
+        'interaction "gravity": no system "suns". Did you mean "sun"? There are: sun.'
+    )

@@ -64,9 +64,62 @@ def test_tracers_are_pulled_and_do_not_pull() -> None:
     assert sim["tracer"].position[0] == pytest.approx([0, 1, 0], abs=1e-6)
     assert (sim["sun"].position == 0).all()
     assert sim.measure().potential == pytest.approx(-5.0, rel=1e-6)
-    lost = simulation(tracer, sun, interact=[motes.interact.Gravity(sources=["moon"])])
-    with pytest.raises(motes.SceneError, match='source "moon" does not take part'):
-        lost.run(steps=1)
+    with pytest.raises(motes.SceneError, match=r'no system "suns"\. Did you mean "sun"'):
+        simulation(tracer, sun, interact=[motes.interact.Gravity(sources=["suns"])])
+    apart = motes.interact.Gravity(systems=["tracer"], sources=["sun"])
+    with pytest.raises(motes.SceneError, match='source "sun" does not take part'):
+        simulation(tracer, sun, interact=[apart]).run(steps=1)
+
+
+def test_a_tolerance_that_single_precision_cannot_keep_is_a_line_with_the_remedy() -> None:
+    star = body("star", 1.0, (0, 0, 0), (0, 0, 0))
+    fine = [motes.interact.Gravity(tolerance=1e-8)]
+    with pytest.raises(motes.SimulationError, match=r'at least 1e-06 .* precision = "double"'):
+        simulation(star, interact=fine, precision="single").run(steps=1)
+    simulation(star, interact=fine).run(steps=1)
+
+
+@pytest.mark.parametrize("method", ["position_verlet", "yoshida4", "rk4", "dopri5", "nystrom5"])
+@pytest.mark.parametrize(("tolerance", "n"), [(0.0, 150), (1e-3, 2500)])
+def test_measures_are_sums_over_all_systems(method: str, tolerance: float, n: int) -> None:
+    """T, U and P of stars and gas that pull on each other, and of dust that only feels them.
+
+    U = -G (sum over pairs of sources, once + dust in their field); dP/dt of the sources is 0.
+    """
+    stars, gas = (
+        motes.System(name, mass=0.5 / n, emit=[motes.emit.Plummer(burst=[{"count": n}], mu=1.0)])
+        for name in ("stars", "gas")
+    )
+    dust = motes.System("dust", mass=1e-3, emit=[motes.emit.Plummer(burst=[{"count": 40}])])
+    sources = ("gas", "stars")
+    law = motes.interact.Gravity(
+        G=1.0, softening=0.1, softening_kernel="plummer", tolerance=tolerance, sources=sources
+    )
+    sim = simulation(stars, gas, dust, interact=[law], integrator=method, step=0.02)
+    sim.run(steps=1)
+    before = sum(0.5 / n * sim[name].velocity.sum(axis=0) for name in sources)
+    sim.run(steps=4)
+    after = sum(0.5 / n * sim[name].velocity.sum(axis=0) for name in sources)
+    x = np.concatenate([sim[name].position for name in sources])
+
+    def depth(places: np.ndarray) -> np.ndarray:
+        apart = ((places[:, None] - x[None]) ** 2).sum(axis=2) + 0.1**2
+        return (0.5 / n / np.sqrt(apart)).sum(axis=1)
+
+    parts = np.concatenate([depth(part) for part in np.array_split(x, 20)])
+    mutual = 0.5 * (0.5 / n) * (parts.sum() - 2 * n * (0.5 / n) / 0.1)
+    potential = -mutual - 1e-3 * depth(sim["dust"].position).sum()
+    kinetic = 0.5 * sum(
+        m * (sim[name].velocity ** 2).sum()
+        for name, m in (("stars", 0.5 / n), ("gas", 0.5 / n), ("dust", 1e-3))
+    )
+    measures = sim.measure()
+    assert measures.mass == pytest.approx(1.04, rel=1e-12)
+    assert measures.kinetic == pytest.approx(kinetic, rel=1e-12)
+    assert measures.potential == pytest.approx(potential, rel=max(tolerance, 1e-12))
+    assert measures.virial_ratio == pytest.approx(-2 * kinetic / potential, rel=1e-3)
+    strength = 0.4  # Of a Plummer sphere of G M = a = 1, sum m |a| is about this.
+    assert after - before == pytest.approx(0, abs=4 * 0.02 * strength * tolerance + 1e-14)
 
 
 def test_a_tolerance_keeps_the_motion_of_direct_sums() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -124,6 +125,27 @@ def test_a_disc_is_exponential_and_turns_with_its_centre() -> None:
     turning = (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]) / r
     assert turning == pytest.approx(r * np.sqrt(2.0 * (r**2 + soft**2) ** -1.5), rel=1e-7)
     assert (x[:, :2] * v[:, :2]).sum(axis=1) == pytest.approx(0, abs=1e-7)
+
+
+def test_the_stars_of_a_disc_wander_in_the_ratio_of_epicycles() -> None:
+    """sigma_R = share Omega R; sigma_phi / sigma_R = kappa / (2 Omega), kappa^2 from Omega(R)."""
+    soft, share = 0.4, 0.1
+    birth = motes.emit.DiscGalaxy.kernel("birth")
+    p = SimpleNamespace(
+        mu=1.0, softening=soft, scale=1.0, inner=0.0, outer=5.0, height=0.0, dispersion=share
+    )
+    for u in np.random.default_rng(2).random((20, 6)):
+        x, y, _, vx, vy, _ = birth(p, u, 0.0, 1)
+        r = np.hypot(x, y)
+        square = lambda s: (s**2 + soft**2) ** -1.5  # noqa: E731
+        omega, step = np.sqrt(square(r)), 1e-4 * r
+        slope = (square(r + step) - square(r - step)) / (2 * step)
+        kappa = np.sqrt(r * slope + 4 * square(r))
+        length, angle = np.sqrt(-2 * np.log(1 - u[4])), 2 * np.pi * u[5]  # Box and Muller.
+        sigma = share * omega * r
+        assert (x * vx + y * vy) / r == pytest.approx(sigma * length * np.cos(angle), abs=1e-9)
+        ahead = sigma * kappa / (2 * omega) * length * np.sin(angle)
+        assert (x * vy - y * vx) / r == pytest.approx(omega * r + ahead, rel=1e-7)
 
 
 def test_a_disc_stays_as_it_is_around_its_centre() -> None:

@@ -35,7 +35,8 @@ class DiscGalaxy:
     frequencies Omega^2 = mu (R^2 + softening^2)^(-3/2) and, of epicycles,
     kappa^2 = Omega^2 (4 - 3 R^2 / (R^2 + softening^2)). Random motion has the ratio of epicycles,
     sigma_phi / sigma_R = kappa / (2 Omega). Sources: Freeman, Astrophysical Journal 160 (1970) 811;
-    Binney and Tremaine, Galactic Dynamics (2008), sections 3.2.3 and 4.4.3.
+    Toomre, same 139 (1964) 1217; Binney and Tremaine, Galactic Dynamics (2008), sections 3.2.3 and
+    4.4.3.
     """
 
     mu: Number = quantity(1.0, "m3/s2", above=0)
@@ -57,7 +58,8 @@ class DiscGalaxy:
     """Standard deviation of the distance from the plane, as a share of the radius."""
 
     dispersion: Number = quantity(0.0, "", at_least=0)
-    """Standard deviation of the radial speed, as a share of the circular speed."""
+    """Standard deviation of the radial speed, as a share of the circular speed. A disc that pulls
+    on itself is stable where Toomre's Q = sigma_R kappa / (3.36 G Sigma) is above 1."""
 
     draws = 6
 

@@ -208,9 +208,13 @@ class Scene(Section):
 
     @classmethod
     def clashes(cls, values: Mapping[str, Any]) -> list[Problem]:
-        """Systems and components of the whole scene with one name; and within each system."""
+        """Systems and components of the whole scene with one name; and within each system.
+
+        Also systems that an interaction names and that there are not.
+        """
         reserved = [*cls.model_fields, *System.model_fields, "system"]
         found = names.faults(values, ("system", *cls.lists), reserved, "")
+        found += names.strangers(values)
         systems = values.get("system")
         for i, system in enumerate(systems if isinstance(systems, list | tuple) else ()):
             within = System.clashes(system) if isinstance(system, Mapping) else []

@@ -11,10 +11,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from motes.errors import Problem
+from motes.errors import Problem, likely
 
 WORD = re.compile(r"[^\W\d][\w-]{0,63}")
 """A letter or underscore, then letters, digits, underscores and hyphens."""
+
+NAMING = ("systems", "sources", "targets", "hunters")
+"""Parameters of interactions that name systems."""
 
 Path = tuple[str | int, ...]
 
@@ -73,6 +76,27 @@ def faults(
 def _twice(name: str, first: str, second: str) -> str:
     where = f"two in {first}" if first == second else f"one in {first} and one in {second}"
     return f'{where} have the name "{name}"; give one of them a name of its own.'
+
+
+def strangers(values: Mapping[str, Any]) -> list[Problem]:
+    """Systems that interactions name and that there are not, in values that need not be valid."""
+    known = [system.name for system in entries(values, ["system"])]
+    if not known or len(known) < len(values["system"]):
+        return []  # One without a name might be meant.
+    found = []
+    for entry in entries(values, ["interact"]):
+        part = values["interact"][entry.path[1]]
+        for key in NAMING:
+            given = _key(part, key)
+            given = getattr(given, "value", given)  # A control in a component, else plain.
+            for i, name in enumerate(given if isinstance(given, list | tuple) else ()):
+                if isinstance(name, str) and name not in known:
+                    message = (
+                        f'interaction "{entry.name[:64]}": no system "{name[:64]}".'
+                        f"{likely(name, known)} There are: {', '.join(known)}."
+                    )
+                    found.append(Problem((*entry.path, key, i), message))
+    return found
 
 
 def word(name: Any, path: Path, where: str) -> list[Problem]:
