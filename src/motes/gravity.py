@@ -12,6 +12,7 @@ place do not pull each other, and no particle counts itself.
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Any
 
 import numpy as np
@@ -165,7 +166,10 @@ class _Problem:
         targets = self.points if self.apart else None
         box = Box(self.low, self.cube, self.length, self.unit_mass)
         kind = self.law, self.size, self.tolerance, potential
-        return multipole(self.position, self.mass, targets, box, *kind, units)
+        found = multipole(self.position, self.mass, targets, box, *kind, units)
+        if not np.isfinite(of_columns(found[0])[2]).all():
+            warnings.warn("overflow: accelerations beyond float32", RuntimeWarning, stacklevel=3)
+        return found
 
     def _direct(self, potential: bool, units: Units) -> tuple[NDArray[Any], NDArray[Any]]:
         mass = self.mass / self.unit_mass

@@ -88,6 +88,20 @@ def test_close_pairs_lose_nothing_by_the_unit_of_length(off):
     assert relative(gravity.acceleration(x, m, tolerance=1e-10, method="multipole"), exact) < 1e-11
 
 
+def test_large_forces_that_cancel_are_summed_in_double_precision():
+    """On a lattice the rounding of pairs in single precision adds up to a pull on the whole."""
+    x, m = distributions(60_000)["line of equal steps"]
+    a = gravity.acceleration(x, m, tolerance=1e-4, method="multipole")
+    total = (m[:, None] * a).sum(axis=0)
+    assert np.abs(total).max() < 1e-4 * (m[:, None] * np.abs(a)).sum()
+
+
+def test_accelerations_beyond_single_precision_are_told():
+    x, m = plummer_sphere(2000)
+    with pytest.warns(RuntimeWarning, match="overflow"):
+        gravity.acceleration(x.astype(np.float32), m, G=1e39, tolerance=1e-3, method="multipole")
+
+
 @pytest.mark.parametrize("name", ["uniform", "plummer", "two clusters", "disc"])
 @pytest.mark.parametrize("kernel", ["spline", "plummer"])
 @pytest.mark.parametrize("softening", [0.01, 0.5])

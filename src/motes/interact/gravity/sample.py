@@ -79,6 +79,11 @@ class Sample:
         square = (sums.sum() + DEVIATIONS * math.sqrt(variance)) / self.weight.sum()
         return math.sqrt(square) / (self.typical(values) or math.inf)
 
+    def drift(self, wrong: NDArray[np.float64], values: NDArray[np.float64]) -> float:
+        """Sum of vectors (3, n) over all, as a share of the sum of values."""
+        total = float(np.linalg.norm((self.weight * wrong).sum(axis=1)))
+        return total / (float((self.weight * values).sum()) or math.inf)
+
 
 def sample_of(tree: Tree) -> Sample:
     """Leaves in classes by radius, as the largest errors are those of few large leaves.
