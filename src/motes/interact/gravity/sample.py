@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 
 from motes.interact.gravity.tree import END, RADIUS, START, Tree
 
+EVERY = 160
+"""Most target leaves that are all taken."""
+
 LEAVES = 16
 """Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
-LEAVES_OF_A_CLASS = 4
+LEAVES_OF_A_CLASS = 6
 """Fewest target leaves out of each further class, which has twice as many as the one before."""
 
 LEAVES_BY_SHARE = 32
@@ -91,14 +94,15 @@ def sample_of(tree: Tree) -> Sample:
     Those chosen from a class are far from each other along the tree's curve.
     """
     leaves, cells, targets = tree.leaves, tree.cells, tree.place.shape[1]
-    borders = [LEAVES << k for k in range(32) if LEAVES << k < len(leaves)]
+    sizes = [LEAVES << k for k in range(32 if len(leaves) > EVERY else 0)]
+    borders = [size for size in sizes if size < len(leaves)]
     if borders:
         leaves = leaves[np.argpartition(-tree.bodies[leaves, RADIUS], borders)]
     chosen, weights, chances = [], [], []
     for first, last in zip([0, *borders], [*borders, len(leaves)], strict=True):
         some = np.sort(leaves[first:last])
         every = int((cells[some, END] - cells[some, START]).sum())
-        number = LEAVES_OF_A_CLASS if first else LEAVES
+        number = LEAVES_OF_A_CLASS if first else len(some)
         number = min(max(number, LEAVES_BY_SHARE * every // targets), len(some))
         picked = some[(np.arange(number) * 2 + 1) * len(some) // (2 * number)]
         counts = cells[picked, END] - cells[picked, START]
