@@ -195,11 +195,11 @@ def crossover(tolerance: float, dtype: np.dtype[Any]) -> float:
     """Number of particles from which the multipole method is faster than direct sums.
 
     A fit to measurements on a processor with AVX2, where both take as long (two cores, a Plummer
-    sphere): 9 700, 16 700 in single precision at 1e-3, 1e-5; 3 600, 4 600, 26 000 in double at
+    sphere): 7 900, 14 000 in single precision at 1e-3, 1e-5; 3 100, 4 700, 17 000 in double at
     1e-3, 1e-5, 1e-8.
     """
     digits = max(-math.log10(tolerance), 2.0)
-    base, growth = (9_700.0, 1.31) if dtype == np.float32 else (3_300.0, 1.48)
+    base, growth = (7_900.0, 1.33) if dtype == np.float32 else (3_100.0, 1.36)
     return base * math.pow(growth, digits - 3.0)
 
 
