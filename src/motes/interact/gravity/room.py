@@ -52,3 +52,8 @@ def borrowed() -> Iterator[Room]:
     # After a fault in the middle it is not kept: somebody may still look at it.
     if sum(other.size for other in [*_kept, room]) <= KEPT * budget():
         _kept.append(room)
+
+
+def release() -> None:
+    """Give back what is kept."""
+    _kept.clear()
