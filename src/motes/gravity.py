@@ -24,8 +24,9 @@ from motes.interact.gravity.multipole import Units, multipole
 from motes.interact.gravity.softening import SUPPORT, center_depth
 from motes.interact.gravity.survey import of_columns
 from motes.interact.gravity.tree import Box
+from motes.interact.gravity.trees import Trees
 
-__all__ = ["acceleration", "field", "potential"]
+__all__ = ["Trees", "acceleration", "field", "potential"]
 
 METHODS = ("auto", "direct", "multipole")
 SOFTENINGS = ("spline", "plummer")
@@ -50,6 +51,7 @@ def acceleration(
     tolerance: float | None = None,
     method: str = "auto",
     targets: ArrayLike | None = None,
+    trees: Trees | None = None,
 ) -> NDArray[Any]:
     """Accelerations a_i = G sum_j m_j s(r) (x_j - x_i), s = 1 / r^3 where there is no softening.
 
@@ -66,13 +68,15 @@ def acceleration(
         (1e-6 for float32); None for direct sums.
     method: "direct", "multipole", or "auto": the faster one that keeps the tolerance.
     targets: other points (k, 3) at which to find the acceleration.
+    trees: `Trees()` that sums over the same particles, one after another, are given to use again
+        while these move little; without, a sum depends on nothing else.
 
     Returns (n, 3) or (k, 3). Raises ValueError for wrong shapes or values.
 
     Source of the multipole method: Dehnen, Computational Astrophysics and Cosmology 1 (2014) 1.
     """
     problem = _Problem(x, m, G, softening, softening_kernel, tolerance, method, targets)
-    return problem.fields(False)[0]
+    return problem.fields(False, trees)[0]
 
 
 def potential(
@@ -85,6 +89,7 @@ def potential(
     tolerance: float | None = None,
     method: str = "auto",
     targets: ArrayLike | None = None,
+    trees: Trees | None = None,
 ) -> NDArray[Any]:
     """Potentials phi_i = -G sum_j m_j w(r), j not i, w = 1 / r where there is no softening.
 
@@ -92,7 +97,7 @@ def potential(
     (k,). The energy of all is half the sum of m phi. Coincident particles count only if softened.
     """
     problem = _Problem(x, m, G, softening, softening_kernel, tolerance, method, targets)
-    return problem.fields(True)[1]
+    return problem.fields(True, trees)[1]
 
 
 def field(
@@ -105,10 +110,11 @@ def field(
     tolerance: float | None = None,
     method: str = "auto",
     targets: ArrayLike | None = None,
+    trees: Trees | None = None,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Accelerations and potentials together, as `acceleration` and `potential` give them."""
     problem = _Problem(x, m, G, softening, softening_kernel, tolerance, method, targets)
-    return problem.fields(True)
+    return problem.fields(True, trees)
 
 
 class _Problem:
@@ -151,7 +157,9 @@ class _Problem:
         self.law = kernel if softening > 0.0 else "newton"
         self.size = softening * (SUPPORT if kernel == "spline" else 1.0) / self.length
 
-    def fields(self, potential: bool) -> tuple[NDArray[Any], NDArray[Any]]:
+    def fields(
+        self, potential: bool, trees: Trees | None = None
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
         """Accelerations (k, 3), and with `potential` potentials (k,) without what each particle
         adds to itself, in the caller's units."""
         if not len(self.points) or not self.total:
@@ -166,7 +174,7 @@ class _Problem:
         targets = self.points if self.apart else None
         box = Box(self.low, self.cube, self.length, self.unit_mass)
         kind = self.law, self.size, self.tolerance, potential
-        found = multipole(self.position, self.mass, targets, box, *kind, units)
+        found = multipole(self.position, self.mass, targets, box, *kind, units, trees)
         if not np.isfinite(of_columns(found[0])[2]).all():
             warnings.warn("overflow: accelerations beyond float32", RuntimeWarning, stacklevel=3)
         return found

@@ -225,7 +225,7 @@ def test_a_reach_may_change_over_time() -> None:
 def test_faults_of_laws_are_said_in_one_line() -> None:
     with pytest.raises(motes.SceneError, match=r"reach 3 m is more than half of .* 2 m"):
         gas(Cushion(radius=3.0))
-    with pytest.raises(motes.SceneError, match=r'sources names "c".*There are: a, b'):
+    with pytest.raises(motes.SceneError, match=r'no system "c"\. There are: a, b'):
         gas(Cushion(sources=["c"]))
     with pytest.raises(motes.SceneError, match="above 0"):
         Cushion(radius=0.0)

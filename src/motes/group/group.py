@@ -104,7 +104,7 @@ class Group:
         alive = {name: s.births(systems[name], interval) for name, s in self.steppers.items()}
         kept = {name: (alive[name], systems[name].deaths) for name in alive}
         if memory.kept != kept:
-            memory.kept, memory.push = kept, None
+            memory.kept, memory.push, memory.trees = kept, None, {}
         begin = partial(self._bodies, systems, alive, interval.begin)
         self.nearby.settle(kept, begin, memory)
         members = {name: self.member(name, systems[name], alive[name], memory) for name in alive}
@@ -186,9 +186,8 @@ class Group:
             bodies = []
             for name, m in members.items():
                 x, mass = np.ascontiguousarray(m.y[:3, : m.alive]), m.stepper.mass(m.rows, m.alive)
-                bodies.append(
-                    Bodies(name, x, mass, partial(m.stepper.numbers, m.rows, m.alive, time))
-                )
+                births = partial(m.stepper.numbers, m.rows, m.alive, time)
+                bodies.append(Bodies(name, x, mass, births, memory.trees))
             for _, interaction in self.interactions:
                 chosen, p = partners(interaction, bodies), values(interaction, time)
                 found = kernel(interaction, "accelerations")(p, chosen)

@@ -1,4 +1,4 @@
-"""What a group keeps from step to step: neighbour lists, and what was last summed up."""
+"""What a group keeps from step to step: lists, trees, and what was last summed up."""
 
 from __future__ import annotations
 
@@ -117,6 +117,8 @@ class Lasting:
     """Systems whose rows are scattered, to be moved before the next step."""
     steps: int = 0
     """How many steps were begun."""
+    trees: dict[Any, Any] = field(default_factory=dict)
+    """`motes.gravity.Trees` of sums over all pairs, by what is summed."""
     rooms: dict[Any, Any] = field(default_factory=dict)
     """Memory of lists that nobody else holds: those that replace them may be written there."""
 
@@ -126,7 +128,13 @@ class Lasting:
         self.rooms = {}
         push = self.push and {name: array.copy() for name, array in self.push.items()}
         return replace(
-            self, lists=list(self.lists), untidy=set(self.untidy), rooms={}, push=push, pushes={}
+            self,
+            lists=list(self.lists),
+            untidy=set(self.untidy),
+            trees={kind: trees.copy() for kind, trees in self.trees.items()},
+            rooms={},
+            push=push,
+            pushes={},
         )
 
     def pushed(self, name: str, alive: int, real: Any) -> NDArray[Any]:
@@ -144,6 +152,8 @@ class Lasting:
             for arranged in part.arranged.values() if part else ():
                 yield from (arranged.order, arranged.real.position)
             yield from part.marks.values() if part else ()
+        for trees in self.trees.values():
+            yield from trees.arrays()
         yield from (self.push or {}).values()
 
 

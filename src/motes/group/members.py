@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,8 @@ class Bodies:
     mass: NDArray[Any]
     births: Callable[[], NDArray[np.int64]] = lambda: np.zeros((2, 0), np.int64)
     """Gives which births they are (2, n): number of the stream of births, and k from 1 on."""
+    kept: dict[Any, Any] = field(default_factory=dict)
+    """What interactions keep from one sum to the next, while there are the same particles."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from motes.errors import SceneError, SimulationError
+from motes.interact.gravity.trees import Trees
 
 if TYPE_CHECKING:
     from motes.group import Bodies
@@ -40,13 +41,20 @@ def field_among(p: Any, bodies: Sequence[Bodies], field: Callable[..., Any]) -> 
     }
     passive = [body for body in bodies if not pulls(p, body)]
     try:
-        found = _parted(field(x.T, m, **law).T, sources)
+        found = _parted(field(x.T, m, trees=_trees(sources), **law).T, sources)
         if passive:
             y, _ = _joined(passive)
-            found |= _parted(field(x.T, m, targets=y.T, **law).T, passive)
+            trees = _trees([*sources, *passive])
+            found |= _parted(field(x.T, m, targets=y.T, trees=trees, **law).T, passive)
     except ValueError as fault:
         raise SimulationError(f'interaction "gravity": {fault}') from None
     return [found[body.name] for body in bodies]
+
+
+def _trees(bodies: Sequence[Bodies]) -> Trees:
+    """Those of the last sum over these systems."""
+    found: Trees = bodies[0].kept.setdefault(("gravity", *(b.name for b in bodies)), Trees())
+    return found
 
 
 def _joined(bodies: Sequence[Bodies]) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -24,7 +24,9 @@ from motes.interact.gravity.tree import (
     Box,
     Tree,
     octree,
+    regrown,
 )
+from motes.interact.gravity.trees import Kept, Trees
 from motes.interact.gravity.upward import divide_work, summarize
 from motes.interact.gravity.walk import walker
 from motes.jit import blocks, each, jit, share, threads
@@ -116,16 +118,25 @@ def multipole(
     tolerance: float,
     potential: bool,
     units: Units,
+    trees: Trees | None = None,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Sums as `direct` gives them, of sources (n, 3) with masses (n,) at targets (k, 3) or sources.
 
     Points are inside of the box, and they and the masses in the caller's units, `size` in those of
     the box. Returns accelerations (k, 3), and with `potential` potentials (k,), in the precision of
     the sources. The rms error on a sample of targets is at most SAFETY times the tolerance, of
-    accelerations and, with `potential`, of potentials.
+    accelerations and, with `potential`, of potentials. `trees` are those of the last sum, and then
+    of this one.
     """
+    trees = trees or Trees()
     with borrowed() as room, borrowed() as other:
         particles, chosen = (source, mass, target, box, law, size, potential), plan(tolerance, law)
+        count = None if target is None else len(target)
+        kind = len(source), count, law, size, potential, tolerance, box.length, box.mass
+        if again := trees.again(kind):
+            problem = Problem.build(*particles, again.plan, room, other, again)
+            if trees.do(again, problem):
+                return problem.unsorted(problem.solve(again.limits), units, source.dtype)
         problem = Problem.build(*particles, chosen, room, other)
         limits = problem.limits_for(tolerance)
         if limits is None and chosen.real is np.float32:
@@ -133,8 +144,9 @@ def multipole(
             chosen = replace(chosen, real=np.float64)
             problem = Problem.build(*particles, chosen, room, other)
             limits = problem.limits_for(tolerance)
-        sums = problem.solve(limits or problem.limits(0.0, 0.0, 0.0))
-        return problem.unsorted(sums, units, source.dtype)
+        limits = limits or problem.limits(0.0, 0.0, 0.0)
+        trees.keep(kind, problem, limits)
+        return problem.unsorted(problem.solve(limits), units, source.dtype)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,17 +176,26 @@ class Problem:
         plan: Plan,
         room: Room | None = None,
         other: Room | None = None,
+        again: Kept | None = None,
     ) -> Problem:
         """Sort the particles into trees and compute the moments, in a room for the sources and one
-        for other targets."""
+        for other targets; or into the cells that they were in."""
         room = room or Room()
         kind = plan.order, law != "plummer", plan.real
-        sources = summarize(octree(source, mass, box, plan.leaf, room), *kind, True, room)
+        if again:
+            tree = regrown(source, mass, box, again.sources, room)
+        else:
+            tree = octree(source, mass, box, plan.leaf, room)
+        sources = summarize(tree, *kind, True, room)
         targets = sources
         if target is not None:
             equal = np.full(len(target), box.mass / len(target))
             other = other or Room()
-            targets = summarize(octree(target, equal, box, plan.leaf, other), *kind, False, other)
+            if again:
+                tree = regrown(target, equal, box, again.targets, other)
+            else:
+                tree = octree(target, equal, box, plan.leaf, other)
+            targets = summarize(tree, *kind, False, other)
         out = room.array("sums", (4 if potential else 3, targets.place.shape[1]), plan.real)
         return Problem(targets, sources, law, size, potential, plan, out)
 

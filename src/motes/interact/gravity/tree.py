@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from motes.interact.gravity.morton import LEVELS, morton_order
 from motes.interact.gravity.room import Room
-from motes.jit import Calls, each, jit
+from motes.jit import Calls, blocks, each, jit
 
 START, END, FIRST, NUMBER = 0, 1, 2, 3
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
@@ -28,6 +28,9 @@ only, and expansions around its center hardly converge at its edge.
 FINER, LARGER = 1, 3
 """Levels from a usual leaf up to one that is much larger, and on to where each particle is alone:
 the ball around two of these would hold most others."""
+
+BLOCK = 1 << 14
+"""Particles that a thread writes at a time."""
 
 BRANCHES, LEAST = 64, 1024
 """Parts into which particles are divided before the rest is divided in parallel, about, and
@@ -262,6 +265,44 @@ def octree(
         nothing,
         nothing,
     )
+
+
+def regrown(
+    points: NDArray[Any], mass: NDArray[np.float64], box: Box, like: Any, room: Room | None = None
+) -> Tree:
+    """The tree with the cells of another one of as many particles, wherever these are now.
+
+    `like` has an order, cells, leaves, and the most particles in one.
+    """
+    room = room or Room()
+    place = room.array("place", (4, len(points)))
+    given = points, mass, box.origin, box.length, box.mass, like.order, place
+    each(_permute, given, blocks(len(points), BLOCK))
+    nothing = np.empty((0, 0))
+    return Tree(
+        like.leaves,
+        like.largest,
+        like.cells,
+        room.array("bodies", (len(like.cells), 5)),
+        nothing,
+        nothing,
+        like.order,
+        place,
+        nothing,
+        nothing,
+    )
+
+
+@jit(numba=False)
+def _permute(
+    points: Any, mass: Any, origin: Any, length: Any, unit: Any, order: Any, place: Any,
+    first: Any, last: Any,
+) -> None:  # fmt: skip
+    for i in range(first, last):
+        k = order[i]
+        for axis in range(3):
+            place[axis, i] = (points[k, axis] - origin[axis]) / length
+        place[3, i] = mass[k] / unit
 
 
 def _cells(key: NDArray[np.uint64], leaf: int, room: Room) -> NDArray[np.int32]:
