@@ -1,12 +1,12 @@
-"""Trees that one sum leaves for the next: the error stays below the tolerance while they are used."""
+"""Trees that one sum leaves for the next: errors stay below the tolerance while they are used."""
 
 import numpy as np
 import pytest
+from test_gravity_multipole import distributions, relative
 
 import motes
 from motes import gravity, neighbours
 from motes.interact.gravity.trees import SUMS
-from tests.laws.test_gravity_multipole import distributions, relative
 
 NAMES = ["uniform", "plummer", "two clusters", "disc", "masses over 1e12"]
 
