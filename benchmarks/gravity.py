@@ -2,8 +2,8 @@
 
 Equal masses of a Plummer sphere, unsoftened. Errors are rms |a - a_direct| / rms |a| on 300
 particles, with direct sums in double precision. Each peer, where it is installed, runs at some of
-its own settings, and `gravity.acceleration` at a tolerance equal to the error that the peer was
-measured to have, so that a ratio of times never compares us with something more exact. Peers use as
+its own settings, and `gravity.acceleration` at a tolerance with which its measured error is that of
+the peer or less, so that a ratio of times never compares us with something more exact. Peers use as
 many threads as we do. `--part NAME` measures one part, each in about a minute.
 """
 
@@ -158,11 +158,22 @@ def peers(report: Report, n: int, tasks: Callable[[Cloud], Iterator[tuple[str, A
         report.figures[f"{name}, error"] = (error, "")
         if 1e-10 <= error < 1:
             ours = f"motes, as exact as {name}"
-            run = cloud.ours(error)
-            found = cloud.error(run())
+            run, found = as_exact(cloud, error)
             report.figures[ours] = (best(run, 3), "s")
             report.figures[f"{ours}, error"] = (found, "")
             report.ratio(name, ours)
+
+
+def as_exact(cloud: Cloud, error: float) -> tuple[Accelerations, float]:
+    """Our sums whose measured error is an error or somewhat less, and what it is.
+
+    A tolerance is an upper limit: at one equal to the error we are more exact than was asked.
+    """
+    first = cloud.ours(error)
+    found = cloud.error(first())
+    second = cloud.ours(error**2 / found)
+    closer = cloud.error(second())
+    return (second, closer) if closer <= error else (first, found)
 
 
 CROSSINGS = [2_000, 4_000, 8_000, 16_000, 32_000]
