@@ -171,7 +171,7 @@ def as_exact(cloud: Cloud, error: float) -> tuple[Accelerations, float]:
     """
     first = cloud.ours(error)
     found = cloud.error(first())
-    second = cloud.ours(error**2 / found)
+    second = cloud.ours(error * (error / found) ** 0.7)
     closer = cloud.error(second())
     return (second, closer) if closer <= error else (first, found)
 
