@@ -175,8 +175,8 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
             inside = read(ascending, 0) < np.int32(end - first)
             for axis in range(3):
                 center = kind(0.0 if relative else body[axis])
-                away = (center - read(near[axis], first)) * scale
-                write(place[axis], 0, choose(inside, away, zero))
+                given = choose(inside, read(near[axis], first), center)
+                write(place[axis], 0, (center - given) * scale)
             write(place[3], 0, choose(inside, read(near[3], first), zero))
             particles_to_moments(place, sums)
         sums_to_moments(sums, tree.moments[cell])
