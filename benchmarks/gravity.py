@@ -195,6 +195,23 @@ def crossovers(report: Report, sizes: list[int]) -> None:
                 report.figures[label] = (best(task, 3) * 1e3, "ms")
 
 
+def again(report: Report, sizes: list[int]) -> None:
+    """Sums while particles move little, with new trees and with those of the sum before."""
+    for n in sizes:
+        x, m = plummer_sphere(n)
+        v = np.random.default_rng(2).normal(size=x.shape)
+        kinds = {"new trees": None, "trees again": gravity.Trees()}
+        times: dict[str, list[float]] = {kind: [] for kind in kinds}
+        for _ in range(12):
+            x += 6e-4 * v
+            for kind, trees in kinds.items():
+                law = {"tolerance": 1e-3, "method": "multipole", "trees": trees}
+                times[kind].append(best(lambda p=x, w=m, k=law: gravity.acceleration(p, w, **k), 1))
+        for kind, seconds in times.items():
+            report.figures[f"n = {n:.0e}, {kind}"] = (float(np.median(seconds)) * 1e3, "ms")
+        report.ratio(f"n = {n:.0e}, trees again", f"n = {n:.0e}, new trees")
+
+
 def starts(report: Report, tolerances: list[float]) -> None:
     for tolerance in tolerances:
         label = f"first call at {tolerance:.0e}, empty kernel cache"
@@ -219,6 +236,7 @@ PARTS: dict[str, Callable[[Report, bool], None]] = {
     "direct": lambda report, quick: direct(report, 20_000 if quick else 65_536),
     "multipole": lambda report, quick: multipole(report, [100_000] + [1_000_000] * (not quick)),
     "large": lambda report, quick: multipole(report, [10_000_000] * (not quick)),
+    "again": lambda report, quick: again(report, [100_000] + [1_000_000] * (not quick)),
     "memory": lambda report, quick: memory(report, 100_000 if quick else 1_000_000),
     "pytreegrav": lambda report, quick: peers(
         report, 20_000 if quick else 200_000, pytreegrav_tasks, True

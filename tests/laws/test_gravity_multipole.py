@@ -11,7 +11,8 @@ from motes import gravity
 from motes.interact.gravity.acceptance import acceptance
 from motes.interact.gravity.expansions import folded, terms
 from motes.interact.gravity.lanes import LANES, read, write
-from motes.interact.gravity.multipole import Plan, Problem
+from motes.interact.gravity.multipole import Plan, Problem, plan
+from motes.interact.gravity.sample import sample_of
 from motes.interact.gravity.tree import NUMBER, SPREAD, Box, octree
 from motes.interact.gravity.upward import MANY, summarize
 from motes.jit import jit
@@ -94,6 +95,21 @@ def test_large_forces_that_cancel_are_summed_in_double_precision():
     a = gravity.acceleration(x, m, tolerance=1e-4, method="multipole")
     total = (m[:, None] * a).sum(axis=0)
     assert np.abs(total).max() < 1e-4 * (m[:, None] * np.abs(a)).sum()
+
+
+def test_the_sample_sees_a_pull_on_the_whole():
+    """Where one in five is pulled, an error of the total is more than the rms error shows."""
+    x, m = plummer_sphere(4000)
+    problem = Problem.build(x, m, None, box(x), "newton", 0.0, False, plan(1e-3, "newton"))
+    sample = sample_of(problem.targets)
+    rng = np.random.default_rng(4)
+    n = len(sample.rows)
+    exact = rng.normal(size=(3, n)) * np.where(rng.random(n) < 0.8, 1e-3, 1.0)
+    bias = np.array([[0.01], [0.0], [0.0]])
+    pulled = sample.weight * problem.targets.place[3, sample.rows]
+    drift = 0.01 * pulled.sum() / (pulled * np.linalg.norm(exact, axis=0)).sum()
+    assert sample.relative(np.full(n, 0.01), np.linalg.norm(exact, axis=0), 0.0) < drift
+    np.testing.assert_allclose(problem._error(sample, exact + bias, exact), drift, rtol=1e-6)
 
 
 def test_accelerations_beyond_single_precision_are_told():

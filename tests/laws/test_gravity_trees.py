@@ -66,12 +66,21 @@ def test_other_targets_keep_trees_of_their_own():
 )
 def test_what_is_no_longer_so_is_made_anew(change):
     x, m = distributions(3000)["plummer"]
-    trees = gravity.Trees()
+    m, trees = 1.9 * m, gravity.Trees()  # And 1.9 * 0.7 are measured in the same unit.
     gravity.acceleration(x, m, tolerance=1e-3, method="multipole", trees=trees)
     x, m = change(x, m)
     a = gravity.acceleration(x, m, tolerance=1e-3, method="multipole", trees=trees)
     assert sums_of(trees) == 1
     assert np.array_equal(a, gravity.acceleration(x, m, tolerance=1e-3, method="multipole"))
+
+
+def test_a_copy_knows_the_same_and_goes_its_own_way():
+    x, m = distributions(3000)["plummer"]
+    options, trees = {"tolerance": 1e-3, "method": "multipole"}, gravity.Trees()
+    gravity.acceleration(x, m, trees=trees, **options)
+    other = trees.copy()
+    gravity.acceleration(x, m, trees=other, **options)
+    assert (sums_of(trees), sums_of(other)) == (1, 2)
 
 
 def run(steps, look):
