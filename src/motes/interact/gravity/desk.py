@@ -25,8 +25,7 @@ class Limits(NamedTuple):
     opening2: float
     """Square of the largest (r_A + r_B) / R at which expansions are used."""
     error: float
-    """Largest estimated error of the acceleration by one use of an expansion for a leaf; for
-    cells of more particles it falls with the root of their number, as that costs little."""
+    """Largest estimated error of the acceleration by one use of an expansion."""
     easier: float
     """How many times less may be neglected where the lower order is used."""
     force: float

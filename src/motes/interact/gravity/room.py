@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from motes.memory import afford, budget
+from motes.memory import LINE, afford, budget
 
 KEPT = 1 / 8
 """Share of the memory's budget that is kept for the next solution, at most."""
@@ -29,7 +29,8 @@ class Room:
         if piece is None or piece.size < size:
             afford(size, "the multipole method")
             self._pieces.pop(name, None)  # Before there is another one.
-            piece = self._pieces[name] = np.empty(size + size // 16, np.uint8)
+            piece = np.empty(size + size // 16 + LINE, np.uint8)
+            piece = self._pieces[name] = piece[-piece.ctypes.data % LINE :]
         return piece[:size].view(dtype).reshape(shape)
 
     @property

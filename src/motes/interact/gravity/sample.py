@@ -21,11 +21,11 @@ LEAVES = 16
 LEAVES_OF_A_CLASS = 6
 """Fewest target leaves out of each further class, which has twice as many as the one before."""
 
-LEAVES_BY_SHARE = 32
-"""More target leaves, out of each class as many as is its share of the targets: where most are, a
-few leaves would leave the mean uncertain."""
+LEAVES_BY_SHARE, ONE_IN = 32, 200
+"""More target leaves, that many or one in so many, out of each class as many as is its share of the
+targets: where most are, a few leaves would leave the mean uncertain."""
 
-DEVIATIONS = 2.5
+DEVIATIONS = 4.0
 """Standard errors of a mean square by which it may be larger than the sample says."""
 
 
@@ -98,12 +98,13 @@ def sample_of(tree: Tree) -> Sample:
     borders = [size for size in sizes if size < len(leaves)]
     if borders:
         leaves = leaves[np.argpartition(-tree.bodies[leaves, RADIUS], borders)]
+    by_share = max(LEAVES_BY_SHARE, len(leaves) // ONE_IN)
     chosen, weights, chances = [], [], []
     for first, last in zip([0, *borders], [*borders, len(leaves)], strict=True):
         some = np.sort(leaves[first:last])
         every = int((cells[some, END] - cells[some, START]).sum())
         number = LEAVES_OF_A_CLASS if first else len(some)
-        number = min(max(number, LEAVES_BY_SHARE * every // targets), len(some))
+        number = min(max(number, by_share * every // targets), len(some))
         picked = some[(np.arange(number) * 2 + 1) * len(some) // (2 * number)]
         counts = cells[picked, END] - cells[picked, START]
         chosen.append(picked)

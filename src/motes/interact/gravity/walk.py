@@ -9,7 +9,6 @@ Dehnen, Journal of Computational Physics 179 (2002) 27, with lists owned by the 
 # mypy: disallow-untyped-decorators=False
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -38,8 +37,8 @@ from motes.interact.gravity.tree import (
 from motes.jit import EXACT, jit
 from motes.machine.lanes import bits, choose, lowest, put_some
 
-FULL = 16.0
-"""Particles of a usual leaf, for which the limit of the error holds as it is."""
+OPENED = 1.25
+"""Radius of a source cell, in radii of the target cell, from which it is divided first."""
 
 
 def _expander(operations: Translations) -> Callable[..., None]:
@@ -103,11 +102,10 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
         opened, candidates, chosen = desk.opened, desk.candidates, desk.chosen
         far, easy = desk.far[0], desk.far[1]
         own = targets.balls[cell]
-        radius, e2 = own[BALL_RADIUS], real(limits.e2)
+        large, e2 = own[BALL_RADIUS] * real(OPENED), real(limits.e2)
         count = targets.cells[cell, END] - targets.cells[cell, START]
         is_leaf = targets.cells[cell, NUMBER] == 0
-        error = limits.error / math.sqrt(max(count, FULL) / FULL)
-        allowed = min(error, limits.force / max(targets.bodies[cell, MASS], 1e-300))
+        allowed = min(limits.error, limits.force / max(targets.bodies[cell, MASS], 1e-300))
         allowed = max(allowed, real(1e-30))
         stricter = real(1.0 / allowed), real(limits.easier / allowed)
         few = real(limits.few // count)
@@ -145,7 +143,7 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
                 separate = separate & (inner | (particles > few))
                 divides = inner
             else:
-                divides = inner & (others >= radius)
+                divides = inner & (others >= large)
             separate = separate & valid
             remain = valid & ~separate
             accepted += put_some(far, accepted, some, separate & ~low_order_does)
