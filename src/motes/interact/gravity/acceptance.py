@@ -11,7 +11,11 @@ from typing import Any
 import numpy as np
 
 from motes.jit import EXACT, jit
+from motes.machine.lanes import choose
 from motes.machine.traced import gathered, traced
+
+LEAST = 0.1
+"""Square of the smallest ratio of radii that makes a difference."""
 
 
 @traced
@@ -52,11 +56,13 @@ def acceptance(order: int, low: int, real: type) -> Callable[..., Any]:
     Sources s from B's center make an error of about sum m (r_A + s)^p / R^(p + 2) / (1 - q^2) in
     the acceleration at distance r_A from A's, the sum of the terms that are left out, with
     q = (r_A + r_B) / R. By Minkowski's inequality that sum is at most M (r_A + S)^p with B's spread
-    S = (sum m s^p / M)^(1/p): a few light bodies at the edge of B count for little. `stricter` is
-    one over the error that is allowed, for both orders. q^2 is below `opening2`, the balls are more
-    than `reach` apart, and e2 is added to R^2.
+    S = (sum m s^p / M)^(1/p): a few light bodies at the edge of B count for little. Cells smaller
+    than the target come in crowds, and errors that the target's radius makes are alike for a crowd:
+    M then stands for M (r_A / r_B)^4, less where r_B is tiny. `stricter` is one over the error that
+    is allowed, for both orders. q^2 is below `opening2`, the balls are more than `reach` apart, and
+    e2 is added to R^2.
     """
-    one = real(1)
+    one, least = real(1), real(LEAST)
     power_of_order, power_of_low = power(order), power(low)
 
     @jit(inline=True, flags=EXACT)
@@ -72,7 +78,9 @@ def acceptance(order: int, low: int, real: type) -> Callable[..., Any]:
         rest = one - square * inverse
         spreads = spread + own[6]
         q = np.sqrt(spreads * spreads * inverse)
-        pull = mass * inverse
+        own2 = own[6] * own[6]
+        smaller = own2 / (radius * radius + own2 * least)
+        pull = mass * inverse * choose(smaller > one, smaller * smaller, one)
         apart = (r2 > gap * gap) & (square < opening2 * r2)
         far = apart & (pull * stricter[0] * power_of_order(q) < rest)
         easy = far & (pull * stricter[1] * power_of_low(q) < rest)

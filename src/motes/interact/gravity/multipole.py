@@ -18,6 +18,7 @@ from numpy.typing import DTypeLike, NDArray
 from motes.interact.gravity.desk import Desk, Limits, desk
 from motes.interact.gravity.room import Room, borrowed
 from motes.interact.gravity.sample import Sample, sample_of
+from motes.interact.gravity.softening import ROUGH
 from motes.interact.gravity.translations import translations
 from motes.interact.gravity.tree import (
     START,
@@ -35,7 +36,7 @@ from motes.machine.lanes import fetch
 SINGLE_FROM = 4e-6
 """Smallest tolerance that single precision keeps."""
 
-SAFETY = 0.8
+SAFETY = 0.9
 """Part of the tolerance that the likely error may use, as seen on the sample."""
 
 FIRST, MOST = 2.0, 8.0
@@ -48,11 +49,14 @@ MOMENTUM = 0.1
 ENOUGH = 5.0
 """How much less it must neglect at least, or it is made again."""
 
-AIM = 0.9
+AIM = 0.92
 """Part of what is allowed that the next trial is to use."""
 
-EASIER = 3.0
+EASIER = 4.0
 """How many times less an expansion of the lower order may neglect: there are many of them."""
+
+ALONE = 8
+"""How many times longer the walk is for a target of the sample: its ways down are for few."""
 
 TRIALS = 8
 """Trials before all is summed in double precision, and there by pairs."""
@@ -86,6 +90,8 @@ class Plan:
     """Most particles in a leaf."""
     real: type
     """Precision of expansions and pairs; places are always in double."""
+    rough: bool = False
+    """Whether pairs may be wrong by ROUGH."""
     opening: float = 1.0
     """Largest (r_A + r_B) / R at which expansions are used, whatever their estimate."""
 
@@ -96,7 +102,7 @@ def plan(tolerance: float, law: str) -> Plan:
     real = np.float32 if tolerance >= SINGLE_FROM else np.float64
     order = min(max(2, int(2.25 * digits - 1.1)), HIGHEST[law != "plummer"])
     leaf = 52 if digits > 3.5 and real is np.float32 else 28
-    return Plan(order, max(round(0.645 * order), 1), leaf, real)
+    return Plan(order, max(round(0.645 * order), 1), leaf, real, tolerance >= 4 * ROUGH)
 
 
 class Units(NamedTuple):
@@ -233,9 +239,9 @@ class Problem:
         if len(sample.rows) * self.sources.place.shape[1] <= FEW_PAIRS:
             strictest = 0.0
             exact = self._at(sample, self.limits(0.0, 0.0, rounding / stricter))
-        # The walk over all takes about part^(-1/3) of its time, and one over the sample its share.
-        saved = 2 * len(sample.rows) / self.targets.place.shape[1]
-        enough, kept = AIM * max(1.0 - saved, 0.0) ** 3, None
+        # The walk over all takes time in proportion to part^(-1/3); a trial costs ALONE its share.
+        trial = ALONE * len(sample.rows) / self.targets.place.shape[1]
+        enough, kept = AIM * max(1.0 - trial, 0.0) ** 3, None
         for _ in range(TRIALS):
             limits = self.limits(share * scale, MOMENTUM * tolerance * force, rounding)
             if share < ENOUGH * strictest:
@@ -282,7 +288,9 @@ class Problem:
 
     def _walk(self, parts: list[NDArray[np.int64]], limits: Limits) -> NDArray[Any]:
         """Sums at targets, whole leaves; each part is ranges (k, 2) of rows and one task."""
-        walk = walker(self.law, self.plan.real, self.potential, self.plan.order, self.plan.low)
+        chosen = self.plan
+        real, order = chosen.real, chosen.order
+        walk = walker(self.law, real, self.potential, order, chosen.low, chosen.rough)
         operations = translations(self.plan.order, self.law != "plummer")
         same, largest, out = self.targets is self.sources, self.targets.largest, self.out
         harmonic = self.law != "plummer"

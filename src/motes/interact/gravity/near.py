@@ -15,7 +15,7 @@ from motes.interact.gravity.pairs import attraction
 from motes.interact.gravity.softening import center_depth, pair_law
 from motes.interact.gravity.tree import END, MASS, RADIUS, START, Tree, X, Y, Z
 from motes.jit import EXACT, jit
-from motes.machine.lanes import total
+from motes.machine.lanes import fetch, total
 
 ROUNDING = 6e-8
 """Change of a difference of coordinates by single precision, in units of the largest of them."""
@@ -32,17 +32,17 @@ def reach_of(body: Any, x: Any, y: Any, z: Any) -> Any:
 
 
 @cache
-def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
+def near_field(law: str, real: type, potential: bool, rough: bool) -> Callable[..., Any]:
     """Compiled function that adds to `desk.total` the pull of source leaves on a target leaf.
 
     (targets, sources, same, cell, low, high, limits, desk) -> None: the leaves are candidates `low`
-    to `high`; `same`: the trees are one.
+    to `high`; `same`: the trees are one; `rough` as in `pair_law`.
 
     In single precision, coordinates are taken from the leaf's center, and a target for which their
     rounding might matter, because a source is very close, is summed again in double precision.
     """
     single = real is np.float32
-    attract = attraction(law, real, potential, bound=single)
+    attract = attraction(law, real, potential, bound=single, rough=rough)
     exact = pair_law(law, np.float64)
     depth = center_depth(law, 1.0)
     nothing = real(0)
@@ -121,6 +121,10 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
         least, reaches = 1e300, desk.reaches
         for k in range(low, high):
             leaf = desk.candidates[k]
+            first, last = cells[leaf, START], cells[leaf, END]
+            for row in range(4):
+                fetch(near[row], first)
+                fetch(near[row], last - 1)
             reach = reach_of(bodies[leaf], x, y, z)
             reaches[k - low] = reach
             if not (same and leaf == cell):

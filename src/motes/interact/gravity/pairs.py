@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any
 
 from motes.interact.gravity.lanes import LANES, maximum, read
-from motes.interact.gravity.softening import PART, pair_law
+from motes.interact.gravity.softening import pair_law, part_of
 from motes.jit import EXACT, jit
 from motes.machine.lanes import largest, total
 
@@ -17,8 +17,10 @@ AWAY = 1e18
 
 
 @cache
-def attraction(law: str, real: type, potential: bool, bound: bool = False) -> Callable[..., Any]:
-    """Compiled function that adds the pull of sources on targets.
+def attraction(
+    law: str, real: type, potential: bool, bound: bool = False, rough: bool = False
+) -> Callable[..., Any]:
+    """Compiled function that adds the pull of sources on targets, `rough` as in `pair_law`.
 
     (target (3, a), a, source (4, b), b, own, size, out (5, a)) -> None: rows x, y, z, m; b is a
     multiple of LANES. Target i is source i + own[2] if own[0] <= i < own[1]. Adds to rows 0 to 2 of
@@ -28,8 +30,8 @@ def attraction(law: str, real: type, potential: bool, bound: bool = False) -> Ca
     the same have the same coordinates, the sums are not numbers. The source that is the target is
     left out then; otherwise it has no force, but a potential.
     """
-    pair = pair_law(law, real, not bound)
-    zero, one, away, whole = real(0), real(1), real(AWAY), real(1 / PART[real])
+    pair = pair_law(law, real, not bound, rough)
+    zero, one, away, whole = real(0), real(1), real(AWAY), real(1 / part_of(real, rough))
 
     @jit(flags=EXACT, numba=False)
     def attract(

@@ -21,11 +21,11 @@ LEAVES = 16
 LEAVES_OF_A_CLASS = 6
 """Fewest target leaves out of each further class, which has twice as many as the one before."""
 
-LEAVES_BY_SHARE, ONE_IN = 32, 200
+LEAVES_BY_SHARE, ONE_IN = 32, 1000
 """More target leaves, that many or one in so many, out of each class as many as is its share of the
 targets: where most are, a few leaves would leave the mean uncertain."""
 
-DEVIATIONS = 4.0
+DEVIATIONS = 2.5
 """Standard errors of a mean square by which it may be larger than the sample says."""
 
 
@@ -97,7 +97,7 @@ def sample_of(tree: Tree) -> Sample:
     sizes = [LEAVES << k for k in range(32 if len(leaves) > EVERY else 0)]
     borders = [size for size in sizes if size < len(leaves)]
     if borders:
-        leaves = leaves[np.argpartition(-tree.bodies[leaves, RADIUS], borders)]
+        leaves = leaves[np.argsort(-tree.bodies[leaves, RADIUS])]
     by_share = max(LEAVES_BY_SHARE, len(leaves) // ONE_IN)
     chosen, weights, chances = [], [], []
     for first, last in zip([0, *borders], [*borders, len(leaves)], strict=True):

@@ -34,30 +34,40 @@ def center_depth(law: str, size: float) -> float:
 LEAST: dict[type, float] = {np.float32: 1e-24, np.float64: 1e-37}
 """Least squared distance that is told from 0, in boxes: the cube of its root is still a number."""
 
-PART: dict[type, float] = {np.float32: 2 / 3, np.float64: 1.0}
-"""What a law gives of s: in single precision it is cheaper to leave a factor to the end."""
+ROUGH = 2.5e-4
+"""Rms error of s where it is `rough`, in parts of it."""
+
+
+def part_of(real: type, rough: bool) -> float:
+    """What a law gives of s: in single precision it is cheaper to leave a factor to the end."""
+    return 2 / 3 if real is np.float32 and not rough else 1.0
 
 
 @cache
-def pair_law(law: str, real: type, guarded: bool = True) -> Callable[..., Any]:
-    """Compiled function (r2, size) -> (PART s, w), of lanes of type `real`.
+def pair_law(
+    law: str, real: type, guarded: bool = True, rough: bool = False
+) -> Callable[..., Any]:
+    """Compiled function (r2, size) -> (s times `part_of`, w), of lanes of type `real`.
 
     `size` is a length and its inverse: Plummer's softening, or the spline's support radius. Not
-    `guarded`, Newton's law is not a number at r = 0. Sources: Plummer, MNRAS 71 (1911) 460; the
+    `guarded`, Newton's law is not a number at r = 0. `rough`, in single precision, takes the
+    processor's estimate of 1 / r as it is. Sources: Plummer, MNRAS 71 (1911) 460; the
     spline of Monaghan and Lattanzio, A&A 149 (1985) 135, as in Springel, Yoshida and White, New
     Astronomy 6 (2001) 79, equation A1 and its gradient.
     """
-    powers = _powers(real)
+    powers = _powers(real, rough)
     if law == "plummer":
         return _plummer(powers)
-    return _newton(powers, real, guarded) if law == "newton" else _spline(powers, real)
+    if law == "newton":
+        return _newton(powers, real, guarded)
+    return _spline(powers, real, part_of(real, rough))
 
 
-def _powers(real: type) -> Callable[..., Any]:
-    """Compiled function r2 -> (PART / r^3, 1 / r).
+def _powers(real: type, rough: bool) -> Callable[..., Any]:
+    """Compiled function r2 -> (`part_of` / r^3, 1 / r).
 
-    In single precision both come from an estimate y of 1 / r, wrong by a few 1e-4, with the first
-    terms of their Taylor series in 1 - r^2 y^2: 1 / r = y (3 - r^2 y^2) / 2 and
+    In single precision both come from an estimate y of 1 / r, wrong by a few 1e-4, and unless that
+    is enough with the first terms of their Taylor series in 1 - r^2 y^2: 1 / r = y (3 - r^2 y^2) / 2 and
     1 / r^3 = y^3 (5 - 3 r^2 y^2) / 2, wrong by some 1e-7.
     """
     a, b, c = real(5 / 3), real(1.5), real(0.5)
@@ -68,12 +78,14 @@ def _powers(real: type) -> Callable[..., Any]:
         y2 = y * y
         return y * (y2 * (a - r2 * y2)), y * (b - c * (r2 * y2))
 
+    root: Any = rough_inverse_root if real is np.float32 else inverse_root
+
     @jit(inline=True, flags=EXACT)
-    def double(r2: Any) -> Any:
-        y = inverse_root(r2)
+    def plain(r2: Any) -> Any:
+        y = root(r2)
         return y * y * y, y
 
-    return single if real is np.float32 else double  # type: ignore[no-any-return]
+    return single if real is np.float32 and not rough else plain  # type: ignore[no-any-return]
 
 
 def _plummer(powers: Callable[..., Any]) -> Callable[..., Any]:
@@ -97,9 +109,8 @@ def _newton(powers: Callable[..., Any], real: Any, guarded: bool) -> Callable[..
     return newton  # type: ignore[no-any-return]
 
 
-def _spline(powers: Callable[..., Any], real: Any) -> Callable[..., Any]:
+def _spline(powers: Callable[..., Any], real: Any, part: float) -> Callable[..., Any]:
     half, least = real(0.5), real(LEAST[real])
-    part = PART[real]
     f0, f2, f3 = (real(part * c) for c in (32 / 3, -38.4, 32.0))
     g_, g0, g1, g2, g3 = (real(part * c) for c in (-1 / 15, 64 / 3, -48.0, 38.4, -32 / 3))
     v0, v2, v4, v5 = (real(c) for c in (14 / 5, -16 / 3, 48 / 5, -32 / 5))

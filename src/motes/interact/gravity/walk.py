@@ -35,7 +35,11 @@ from motes.interact.gravity.tree import (
     cell_unit,
 )
 from motes.jit import EXACT, jit
-from motes.machine.lanes import bits, choose, lowest, put_some
+from motes.machine.lanes import bits, choose, fetch, lowest, put_some
+
+LINE, LARGE = 16, 64
+"""Numbers that come from memory together, and those of an expansion from which it is announced that
+it will be read."""
 
 OPENED = 1.25
 """Radius of a source cell, in radii of the target cell, from which it is divided first."""
@@ -70,8 +74,11 @@ def _is_wanted(ranges: Any, start: Any, end: Any) -> Any:
 
 
 @cache
-def walker(law: str, real: type, potential: bool, order: int, low_order: int) -> Callable[..., Any]:
-    """Compiled walk for a pair law, numbers of type `real`, with or without the potential.
+def walker(
+    law: str, real: type, potential: bool, order: int, low_order: int, rough: bool = False
+) -> Callable[..., Any]:
+    """Compiled walk for a pair law, `rough` or not, numbers of type `real`, with or without the
+    potential.
 
     (targets, sources, same, ranges, limits, desk, out) -> int: writes to rows 0 to 2 of `out`
     (4, n) the sums of m s dx, and with `potential` to row 3 those of m w, for the particles of
@@ -80,10 +87,11 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
     among its own sources. Source cells whose expansion of order `low_order` is enough are taken
     with that.
     """
-    sum_near = near_field(law, real, potential)
+    sum_near = near_field(law, real, potential, rough)
     harmonic = law != "plummer"
     operations = translations(order, harmonic)
-    local_to_local = operations.local_to_local
+    local_to_local, basis = operations.local_to_local, operations.basis
+    large_rows = basis > LARGE
     lanes_to_local, local_to_particles = operations.lanes_to_local, operations.local_to_particles
     expand = _expander(operations)
     expand_easily = _expander(translations(low_order, harmonic))
@@ -146,7 +154,12 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
                 divides = inner & (others >= large)
             separate = separate & valid
             remain = valid & ~separate
-            accepted += put_some(far, accepted, some, separate & ~low_order_does)
+            more = put_some(far, accepted, some, separate & ~low_order_does)
+            if large_rows:
+                for k in range(accepted, accepted + more):
+                    for part in range(0, basis, LINE):
+                        fetch(sources.moments[far[k]], part)
+            accepted += more
             easily += put_some(easy, easily, some, separate & low_order_does)
             top += put_some(candidates, top, some, remain & ~divides)
             marks = bits(remain & divides)
