@@ -32,6 +32,8 @@ class Limits(NamedTuple):
     """Largest estimated error of that times the mass of the target cell: of its momentum."""
     rounding: float
     """Largest error of the acceleration by rounded coordinates in one sum over pairs."""
+    rough: bool
+    """Whether pairs may be wrong by `softening.ROUGH`, in single precision."""
     few: int
     """Two leaves with a product of numbers of particles up to this are summed by pairs."""
     size: float

@@ -8,6 +8,7 @@ Computational Astrophysics and Cosmology 1 (2014) 1, for acceptance by an estima
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from queue import SimpleQueue
 from typing import Any, NamedTuple
@@ -105,6 +106,17 @@ def plan(tolerance: float, law: str) -> Plan:
     return Plan(order, max(round(0.645 * order), 1), leaf, real, tolerance >= 4 * ROUGH)
 
 
+def plans(tolerance: float, law: str) -> Iterator[Plan]:
+    """The plan, and those that are left if it does not keep the tolerance: large forces that nearly
+    cancel, as on a lattice, leave the errors of their pairs."""
+    first = plan(tolerance, law)
+    yield first
+    if first.rough:
+        yield replace(first, rough=False)
+    if first.real is np.float32:
+        yield replace(first, rough=False, real=np.float64)
+
+
 class Units(NamedTuple):
     """What sums are multiplied by in the caller's units."""
 
@@ -139,20 +151,18 @@ def multipole(
     """
     trees = trees or Trees()
     with borrowed() as room, borrowed() as other:
-        particles, chosen = (source, mass, target, box, law, size, potential), plan(tolerance, law)
+        particles = source, mass, target, box, law, size, potential
         count = None if target is None else len(target)
         kind = len(source), count, law, size, potential, tolerance, box.length, box.mass
         if again := trees.again(kind):
             problem = Problem.build(*particles, again.plan, room, other, again)
             if trees.do(again, problem):
                 return problem.unsorted(problem.solve(again.limits), units, source.dtype)
-        problem = Problem.build(*particles, chosen, room, other)
-        limits = problem.limits_for(tolerance)
-        if limits is None and chosen.real is np.float32:
-            # Large forces that nearly cancel, as on a lattice, leave the rounding of their pairs.
-            chosen = replace(chosen, real=np.float64)
+        for chosen in plans(tolerance, law):
             problem = Problem.build(*particles, chosen, room, other)
             limits = problem.limits_for(tolerance)
+            if limits:
+                break
         limits = limits or problem.limits(0.0, 0.0, 0.0)
         trees.keep(kind, problem, limits)
         return problem.unsorted(problem.solve(limits), units, source.dtype)
@@ -216,6 +226,7 @@ class Problem:
             easier=EASIER,
             force=force,
             rounding=rounding,
+            rough=self.plan.rough,
             few=max(self.plan.order**3 // 2, 16),
             size=self.size,
             reach=self.size if self.law == "spline" else 0.0,
@@ -238,7 +249,8 @@ class Problem:
         share, strictest = tolerance * FIRST, math.inf
         if len(sample.rows) * self.sources.place.shape[1] <= FEW_PAIRS:
             strictest = 0.0
-            exact = self._at(sample, self.limits(0.0, 0.0, rounding / stricter))
+            pairs = self.limits(0.0, 0.0, rounding / stricter)
+            exact = self._at(sample, pairs._replace(rough=False))
         # The walk over all takes time in proportion to part^(-1/3); a trial costs ALONE its share.
         trial = ALONE * len(sample.rows) / self.targets.place.shape[1]
         enough, kept = AIM * max(1.0 - trial, 0.0) ** 3, None
@@ -251,6 +263,7 @@ class Problem:
                     error=strictest * scale,
                     force=limits.force / stricter,
                     rounding=rounding / stricter,
+                    rough=False,
                 )
                 exact = self._at(sample, strict)
             part = self._error(sample, self._at(sample, limits), exact) / (SAFETY * tolerance)
@@ -288,9 +301,7 @@ class Problem:
 
     def _walk(self, parts: list[NDArray[np.int64]], limits: Limits) -> NDArray[Any]:
         """Sums at targets, whole leaves; each part is ranges (k, 2) of rows and one task."""
-        chosen = self.plan
-        real, order = chosen.real, chosen.order
-        walk = walker(self.law, real, self.potential, order, chosen.low, chosen.rough)
+        walk = walker(self.law, self.plan.real, self.potential, self.plan.order, self.plan.low)
         operations = translations(self.plan.order, self.law != "plummer")
         same, largest, out = self.targets is self.sources, self.targets.largest, self.out
         harmonic = self.law != "plummer"

@@ -32,17 +32,18 @@ def reach_of(body: Any, x: Any, y: Any, z: Any) -> Any:
 
 
 @cache
-def near_field(law: str, real: type, potential: bool, rough: bool) -> Callable[..., Any]:
+def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
     """Compiled function that adds to `desk.total` the pull of source leaves on a target leaf.
 
     (targets, sources, same, cell, low, high, limits, desk) -> None: the leaves are candidates `low`
-    to `high`; `same`: the trees are one; `rough` as in `pair_law`.
+    to `high`; `same`: the trees are one.
 
     In single precision, coordinates are taken from the leaf's center, and a target for which their
     rounding might matter, because a source is very close, is summed again in double precision.
     """
     single = real is np.float32
-    attract = attraction(law, real, potential, bound=single, rough=rough)
+    attract = attraction(law, real, potential, bound=single)
+    attract_roughly = attraction(law, real, potential, bound=single, rough=single)
     exact = pair_law(law, np.float64)
     depth = center_depth(law, 1.0)
     nothing = real(0)
@@ -81,7 +82,11 @@ def near_field(law: str, real: type, potential: bool, rough: bool) -> Callable[.
         write(source[3], packed, spread(nothing))
         packed = (packed + LANES - 1) // LANES * LANES
         part[:] = 0
-        attract(desk.target, count, source, packed, own, real(limits.size), part)
+        size = real(limits.size)
+        if single and limits.rough:
+            attract_roughly(desk.target, count, source, packed, own, size, part)
+        else:
+            attract(desk.target, count, source, packed, own, size, part)
         if single:
             # Twice the change of s dx by coordinates that are wrong by a little.
             blur = 2.0 * ROUNDING * (distance + targets.bodies[cell, RADIUS])

@@ -25,6 +25,9 @@ LEAVES_BY_SHARE, ONE_IN = 32, 1000
 """More target leaves, that many or one in so many, out of each class as many as is its share of the
 targets: where most are, a few leaves would leave the mean uncertain."""
 
+LARGEST = 4.0
+"""Times by which a value may be larger than is usual before it is taken for that."""
+
 DEVIATIONS = 2.5
 """Standard errors of a mean square by which it may be larger than the sample says."""
 
@@ -45,7 +48,8 @@ class Sample:
     """(c,) share of the leaves of a class that were not chosen."""
 
     def mean_of_most(self, values: NDArray[np.float64]) -> float:
-        """Mean without the largest sixteenth of those that are not zero.
+        """Mean with none larger than LARGEST times that of most: of all but the largest sixteenth
+        of those that are not zero.
 
         Close pairs and large masses may dominate means of few targets by chance, which would allow
         too large errors.
@@ -56,7 +60,8 @@ class Sample:
             return 0.0
         share = np.cumsum(self.weight[order])
         most = order[share <= max(share[-1] * 15 / 16, share[0])]
-        return float((self.weight[most] * values[most]).sum() / self.weight.sum())
+        usual = (self.weight[most] * values[most]).sum() / self.weight.sum()
+        return float(np.average(np.minimum(values, LARGEST * usual), weights=self.weight))
 
     def typical(self, values: NDArray[np.float64]) -> float:
         """Root mean square of most values."""

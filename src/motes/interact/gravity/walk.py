@@ -74,11 +74,8 @@ def _is_wanted(ranges: Any, start: Any, end: Any) -> Any:
 
 
 @cache
-def walker(
-    law: str, real: type, potential: bool, order: int, low_order: int, rough: bool = False
-) -> Callable[..., Any]:
-    """Compiled walk for a pair law, `rough` or not, numbers of type `real`, with or without the
-    potential.
+def walker(law: str, real: type, potential: bool, order: int, low_order: int) -> Callable[..., Any]:
+    """Compiled walk for a pair law, numbers of type `real`, with or without the potential.
 
     (targets, sources, same, ranges, limits, desk, out) -> int: writes to rows 0 to 2 of `out`
     (4, n) the sums of m s dx, and with `potential` to row 3 those of m w, for the particles of
@@ -87,7 +84,7 @@ def walker(
     among its own sources. Source cells whose expansion of order `low_order` is enough are taken
     with that.
     """
-    sum_near = near_field(law, real, potential, rough)
+    sum_near = near_field(law, real, potential)
     harmonic = law != "plummer"
     operations = translations(order, harmonic)
     local_to_local, basis = operations.local_to_local, operations.basis
