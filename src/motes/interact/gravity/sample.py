@@ -102,12 +102,13 @@ def sample_of(tree: Tree) -> Sample:
     sizes = [LEAVES << k for k in range(32 if len(leaves) > EVERY else 0)]
     borders = [size for size in sizes if size < len(leaves)]
     if borders:
-        leaves = leaves[np.argsort(-tree.bodies[leaves, RADIUS])]
+        leaves = leaves[np.argpartition(-tree.bodies[leaves, RADIUS], borders)]
+    held = cells[leaves, END] - cells[leaves, START]
     by_share = max(LEAVES_BY_SHARE, len(leaves) // ONE_IN)
     chosen, weights, chances = [], [], []
     for first, last in zip([0, *borders], [*borders, len(leaves)], strict=True):
         some = np.sort(leaves[first:last])
-        every = int((cells[some, END] - cells[some, START]).sum())
+        every = int(held[first:last].sum())
         number = LEAVES_OF_A_CLASS if first else len(some)
         number = min(max(number, by_share * every // targets), len(some))
         picked = some[(np.arange(number) * 2 + 1) * len(some) // (2 * number)]
