@@ -8,7 +8,7 @@ import pytest
 from test_gravity import plummer_sphere
 
 from motes import gravity
-from motes.interact.gravity.acceptance import acceptance
+from motes.interact.gravity.acceptance import acceptance, seen
 from motes.interact.gravity.expansions import folded, terms
 from motes.interact.gravity.lanes import LANES, read, write
 from motes.interact.gravity.multipole import Plan, Problem, plan
@@ -193,7 +193,7 @@ def test_the_error_falls_with_the_order(law, orders):
 @pytest.mark.parametrize("name", ["plummer", "two clusters"])
 @pytest.mark.parametrize("order", [3, 5, 8, 11])
 def test_errors_are_the_same_part_of_what_one_expansion_may_neglect(name, order):
-    """All add up to some 0.06 to 0.25 of what one may neglect, from 0.35 to 2e-7 of the field."""
+    """All add up to some 0.1 to 0.5 of what one may neglect, from 0.35 to 2e-7 of the field."""
     x, m = distributions(6000)[name]
     exact = gravity.acceleration(x, m)
     allowed = 5 * 10.0 ** (-(order - 1.5) / 1.3)
@@ -202,26 +202,25 @@ def test_errors_are_the_same_part_of_what_one_expansion_may_neglect(name, order)
     scale = np.sqrt((exact**2).sum(axis=1).mean())
     sums, _ = problem.unsorted(problem.solve(problem.limits(allowed * scale, np.inf, 0.0)))
     ratio = relative(sums, exact) / allowed
-    assert 0.05 < ratio < 0.3
+    assert 0.08 < ratio < 0.6
 
 
 def far(distance, opening=1.0, reach=0.0, error=np.inf, softening=0.0, order=6):
     """Whether a ball of radius 0.3, mass 2 and spread 0.2 is far from one of radius 0.5."""
     own = np.array([0.1, 0.2, 0.3, 0, 0, 0, 0.5, 0.5])
-    balls, found = np.zeros((LANES, 8)), np.zeros((2, LANES))
-    balls[:, 0], balls[:, 6], balls[:, 7] = 5.0, 0.3, 0.2
+    balls, found = np.zeros((LANES, 16)), np.zeros((2, LANES))
+    balls[:, 0], balls[:, 6], balls[:, 7], balls[:, 8] = 5.0, 0.3, 0.2, 2.0
     balls[1, :3] = own[:3] + distance * np.array([2, 1, -2]) / 3
     is_far, chosen = acceptance(order, order - 2, np.float64), np.arange(LANES, dtype=np.int32)
 
     @jit(numba=False)
-    def test(balls, chosen, mass, own, stricter, opening2, reach, e2, found):
-        full, easy, _ = is_far(balls, chosen, read(mass, 0), own, stricter, opening2, reach, e2)
+    def test(balls, chosen, own, stricter, opening2, reach, e2, found):
+        full, easy = is_far(seen(balls, chosen), own, stricter, opening2, reach, e2)
         write(found[0], 0, choose(full, 1.0, 0.0))
         write(found[1], 0, choose(easy, 1.0, 0.0))
 
     stricter = (1 / error, 8 / error)
-    mass = np.full(LANES, 2.0)
-    test(balls, chosen, mass, own, stricter, opening**2, reach, softening**2, found)
+    test(balls, chosen, own, stricter, opening**2, reach, softening**2, found)
     return tuple(found[:, 1] > 0)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from motes.interact.gravity.tree import BALL_RADIUS, CHILDREN, LOW, PULL, SPREAD, X, Y, Z
 from motes.jit import EXACT, jit
 from motes.machine.lanes import choose
 from motes.machine.traced import gathered, traced
@@ -19,17 +20,9 @@ LEAST = 0.1
 
 
 @traced
-def offsets(balls: Any, chosen: Any, own: Any) -> Any:
-    """x, y, z from the ball `own`, radius and spread of rows `chosen` of a table of balls."""
-    given = gathered(balls, chosen, 8)
-    x, y, z = (given[k] - own[k] + (given[3 + k] - own[3 + k]) for k in range(3))
-    return x, y, z, given[6], given[7]
-
-
-@traced
-def columns(contents: Any, chosen: Any) -> Any:
-    """Mass, number of particles and of children of rows `chosen` of a table of contents."""
-    return tuple(gathered(contents, chosen, 4)[:3])
+def seen(balls: Any, chosen: Any) -> Any:
+    """Columns of `Tree.balls`, of the rows `chosen`."""
+    return tuple(gathered(balls, chosen, CHILDREN + 1))
 
 
 @cache
@@ -51,8 +44,8 @@ def power(exponent: int) -> Callable[..., Any]:
 def acceptance(order: int, low: int, real: type) -> Callable[..., Any]:
     """Compiled function that tests LANES source cells together, for expansions of two orders.
 
-    (balls, chosen, mass, own, stricter, opening2, reach, e2) -> lanes: whether the rows `chosen` of
-    `balls` are far from the ball `own`, whether they are for the lower order, and their radii.
+    (others, own, stricter, opening2, reach, e2) -> lanes: whether the balls with the columns
+    `others` are far from the ball `own`, and whether they are for the lower order.
     Sources s from B's center make an error of about sum m (r_A + s)^p / R^(p + 2) / (1 - q^2) in
     the acceleration at distance r_A from A's, the sum of the terms that are left out, with
     q = (r_A + r_B) / R. By Minkowski's inequality that sum is at most M (r_A + S)^p with B's spread
@@ -66,25 +59,25 @@ def acceptance(order: int, low: int, real: type) -> Callable[..., Any]:
     power_of_order, power_of_low = power(order), power(low)
 
     @jit(inline=True, flags=EXACT)
-    def is_far(
-        balls: Any, chosen: Any, mass: Any, own: Any, stricter: Any, opening2: Any, reach: Any,
-        e2: Any,
-    ) -> Any:  # fmt: skip
-        x, y, z, radius, spread = offsets(balls, chosen, own)
+    def is_far(others: Any, own: Any, stricter: Any, opening2: Any, reach: Any, e2: Any) -> Any:
+        x = others[X] - own[X] + (others[LOW] - own[LOW])
+        y = others[Y] - own[Y] + (others[LOW + 1] - own[LOW + 1])
+        z = others[Z] - own[Z] + (others[LOW + 2] - own[LOW + 2])
+        radius, spread, mass = others[BALL_RADIUS], others[SPREAD], others[PULL]
         r2 = x * x + y * y + z * z + e2
-        radii = radius + own[6]
+        radii = radius + own[BALL_RADIUS]
         gap, square = radii + reach, radii * radii
         inverse = one / r2
         rest = one - square * inverse
-        spreads = spread + own[6]
+        spreads = spread + own[BALL_RADIUS]
         q = np.sqrt(spreads * spreads * inverse)
-        own2 = own[6] * own[6]
+        own2 = own[BALL_RADIUS] * own[BALL_RADIUS]
         smaller = own2 / (radius * radius + own2 * least)
         pull = mass * inverse * choose(smaller > one, smaller * smaller, one)
         apart = (r2 > gap * gap) & (square < opening2 * r2)
         far = apart & (pull * stricter[0] * power_of_order(q) < rest)
         easy = far & (pull * stricter[1] * power_of_low(q) < rest)
-        return far, easy, radius
+        return far, easy
 
     if isinstance(is_far, FunctionType):
         # Plain Python: as in machine code, what overflows or is 0 / 0 is no fault, and not far.

@@ -16,7 +16,8 @@ from motes.jit import Calls, blocks, each, jit
 START, END, FIRST, NUMBER = 0, 1, 2, 3
 X, Y, Z, RADIUS, MASS = 0, 1, 2, 3, 4
 LOW, BALL_RADIUS, SPREAD = 3, 6, 7
-PULL, COUNT, CHILDREN = 0, 1, 2
+PULL, COUNT, CHILDREN = 8, 9, 10
+BALL = 16
 
 FEW = 4
 """Most particles in leaves that are much larger than usual.
@@ -57,11 +58,10 @@ class Tree(NamedTuple):
     bodies: NDArray[np.float64]
     """(cells, 5) center of mass, distance of the particle farthest from it, mass."""
     balls: NDArray[Any]
-    """(cells + LANES, 8) the cells as the walk tests many: the center in two parts that sum to it,
-    the radius, and how far from the center the mass is: (sum m s^q / sum m)^(1/q) of distances s,
-    with an even q of at least the order of expansions. The last rows are NOTHING."""
-    contents: NDArray[Any]
-    """(cells + LANES, 4) and as it weighs them: mass, number of particles, of children, and 0."""
+    """(cells + LANES, 16) the cells as the walk tests many: the center in two parts that sum to it,
+    the radius, how far from the center the mass is: (sum m s^q / sum m)^(1/q) of distances s, with
+    an even q of at least the order of expansions, the mass, and the numbers of particles and of
+    children. The last rows are NOTHING. A row of single precision is a cache line."""
     order: NDArray[np.uint32]
     """(n,) row of each particle in the arrays that it came from."""
     place: NDArray[np.float64]
@@ -259,7 +259,6 @@ def octree(
         cells,
         room.array("bodies", (len(cells), 5)),
         nothing,
-        nothing,
         order,
         place,
         nothing,
@@ -284,7 +283,6 @@ def regrown(
         like.largest,
         like.cells,
         room.array("bodies", (len(like.cells), 5)),
-        nothing,
         nothing,
         like.order,
         place,

@@ -16,6 +16,7 @@ from motes.interact.gravity.morton import LEVELS
 from motes.interact.gravity.room import Room
 from motes.interact.gravity.translations import padded, translations
 from motes.interact.gravity.tree import (
+    BALL,
     BALL_RADIUS,
     CHILDREN,
     COUNT,
@@ -40,7 +41,7 @@ from motes.machine.lanes import choose, largest, total
 TASKS, PARTICLES_OF_A_TASK = 64, 4096
 """Parts of the upward pass, at most, and particles of a part at least."""
 
-NOTHING = (8.0, 8.0, 8.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+NOTHING = (8.0, 8.0, 8.0, 0.0, 0.0, 0.0, 1.0) + 9 * (0.0,)
 """A ball without mass, outside of the box: what lanes that are left over are about."""
 
 MANY = 500
@@ -124,14 +125,14 @@ def _measurer(order: int) -> Callable[..., None]:
                 spread_out += bodies[child, MASS] * raised(at_most * at_most)
         bodies[cell, X], bodies[cell, Y], bodies[cell, Z] = x, y, z
         bodies[cell, RADIUS], bodies[cell, MASS] = radius, mass
-        ball, content = tree.balls[cell], tree.contents[cell]
+        ball = tree.balls[cell]
         for axis in range(3):
             ball[axis] = bodies[cell, axis]
             ball[LOW + axis] = bodies[cell, axis] - ball[axis]
         ball[BALL_RADIUS], ball[SPREAD] = cell_unit(radius), 0.0
         if spread_out > 0.0:
             ball[SPREAD] = (spread_out / mass) ** root
-        content[PULL], content[COUNT], content[CHILDREN], content[3] = mass, end - start, number, 0
+        ball[PULL], ball[COUNT], ball[CHILDREN] = mass, end - start, number
 
     return measure  # type: ignore[no-any-return]
 
@@ -238,14 +239,12 @@ def summarize(
     n, rows = tree.place.shape[1], len(tree.cells) + LANES
     near = room.array("records", (4, n + LANES), real)
     near[:, -LANES:] = 0
-    balls = room.array("balls", (rows, 8), real)
+    balls = room.array("balls", (rows, BALL), real)
     balls[-LANES:] = NOTHING
-    contents = room.array("contents", (rows, 4), real)
-    contents[-LANES:] = 0
     count = len(tree.cells) + 1 if sources else 0
     moments = room.array("moments", (count, padded(operations.basis)), real)
     moments[-1:] = 0  # Of rows that lanes which are left over are about.
-    tree = tree._replace(moments=moments, near=near, balls=balls, contents=contents)
+    tree = tree._replace(moments=moments, near=near, balls=balls)
     relative, ascending = real is np.float32, np.arange(LANES, dtype=np.int32)
     tasks = min(max(n // PARTICLES_OF_A_TASK, 1), TASKS)
     cuts = np.searchsorted(tree.cells[branches[:, 0], START], np.arange(tasks + 1) * n / tasks)

@@ -15,17 +15,20 @@ from typing import Any
 
 import numpy as np
 
-from motes.interact.gravity.acceptance import acceptance, columns
+from motes.interact.gravity.acceptance import acceptance, seen
 from motes.interact.gravity.desk import Desk, Limits
 from motes.interact.gravity.lanes import LANES, read, write
 from motes.interact.gravity.near import near_field
 from motes.interact.gravity.translations import Translations, translations
 from motes.interact.gravity.tree import (
     BALL_RADIUS,
+    CHILDREN,
+    COUNT,
     END,
     FIRST,
     MASS,
     NUMBER,
+    PULL,
     RADIUS,
     START,
     Tree,
@@ -139,16 +142,14 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
             write(chosen, 0, some)
             if top + LANES > candidates.size:
                 return -1
-            mass, particles, children = columns(sources.contents, chosen)
-            separate, low_order_does, others = is_far(
-                sources.balls, chosen, mass, own, stricter, opening2, reach, e2
-            )
-            valid, inner = valid & (mass > nothing), children > nothing
+            others = seen(sources.balls, chosen)
+            separate, low_order_does = is_far(others, own, stricter, opening2, reach, e2)
+            valid, inner = valid & (others[PULL] > nothing), others[CHILDREN] > nothing
             if is_leaf:
-                separate = separate & (inner | (particles > few))
+                separate = separate & (inner | (others[COUNT] > few))
                 divides = inner
             else:
-                divides = inner & (others >= large)
+                divides = inner & (others[BALL_RADIUS] >= large)
             separate = separate & valid
             remain = valid & ~separate
             more = put_some(far, accepted, some, separate & ~low_order_does)
