@@ -114,7 +114,7 @@ def test_coincident_particles_do_not_pull_each_other(real, tolerance):
 
 
 @pytest.mark.parametrize("real", [np.float32, np.float64])
-@pytest.mark.parametrize("tolerance", [None, 1e-3])
+@pytest.mark.parametrize("tolerance", [None, 1e-4, 1e-3])
 @pytest.mark.parametrize(("length", "mass"), [(3e20, 2e30), (1e-12, 1e-25), (1.0, 1e33)])
 def test_units_do_not_matter(real, tolerance, length, mass):
     """a scales as mass / length^2, in units where squares and cubes leave single precision."""
@@ -123,7 +123,9 @@ def test_units_do_not_matter(real, tolerance, length, mass):
     a = gravity.acceleration(x.astype(real), m, **options)
     G = length**2 / mass
     scaled = gravity.acceleration(real(length) * x.astype(real), mass * m, G=G, **options)
-    np.testing.assert_allclose(scaled, a, rtol=1e-3, atol=2e-5 * np.abs(a).max())
+    # From a tolerance of 1e-3 on, pairs are rough, and roughness depends on a number's digits.
+    least = 5e-4 if tolerance == 1e-3 else 2e-5
+    np.testing.assert_allclose(scaled, a, rtol=1e-3, atol=least * np.abs(a).max())
 
 
 def test_close_pairs_far_from_the_origin_keep_their_distance():

@@ -10,7 +10,7 @@ from test_gravity import plummer_sphere
 from motes import gravity
 from motes.interact.gravity.acceptance import acceptance, seen
 from motes.interact.gravity.expansions import folded, terms
-from motes.interact.gravity.lanes import LANES, read, write
+from motes.interact.gravity.lanes import LANES, write
 from motes.interact.gravity.multipole import Plan, Problem, plan
 from motes.interact.gravity.sample import sample_of
 from motes.interact.gravity.tree import NUMBER, SPREAD, Box, octree

@@ -23,14 +23,16 @@ class Room:
         self._pieces: dict[str, NDArray[np.uint8]] = {}
 
     def array(self, name: str, shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> Any:
-        """An array of whatever was in a piece, which no array before it may need any more."""
+        """An array that begins at a cache line, of whatever was in a piece, which no array before
+        it may need any more."""
         size = math.prod(shape) * np.dtype(dtype).itemsize
         piece = self._pieces.get(name)
         if piece is None or piece.size < size:
             afford(size, "the multipole method")
             self._pieces.pop(name, None)  # Before there is another one.
-            piece = np.empty(size + size // 16 + LINE, np.uint8)
-            piece = self._pieces[name] = piece[-piece.ctypes.data % LINE :]
+            whole = np.empty(size + size // 16 + LINE, np.uint8)
+            first = -whole.ctypes.data % LINE
+            piece = self._pieces[name] = whole[first : first + size + size // 16]
         return piece[:size].view(dtype).reshape(shape)
 
     @property

@@ -44,9 +44,7 @@ def part_of(real: type, rough: bool) -> float:
 
 
 @cache
-def pair_law(
-    law: str, real: type, guarded: bool = True, rough: bool = False
-) -> Callable[..., Any]:
+def pair_law(law: str, real: type, guarded: bool = True, rough: bool = False) -> Callable[..., Any]:
     """Compiled function (r2, size) -> (s times `part_of`, w), of lanes of type `real`.
 
     `size` is a length and its inverse: Plummer's softening, or the spline's support radius. Not
@@ -66,9 +64,9 @@ def pair_law(
 def _powers(real: type, rough: bool) -> Callable[..., Any]:
     """Compiled function r2 -> (`part_of` / r^3, 1 / r).
 
-    In single precision both come from an estimate y of 1 / r, wrong by a few 1e-4, and unless that
-    is enough with the first terms of their Taylor series in 1 - r^2 y^2: 1 / r = y (3 - r^2 y^2) / 2 and
-    1 / r^3 = y^3 (5 - 3 r^2 y^2) / 2, wrong by some 1e-7.
+    In single precision both come from an estimate y of 1 / r, wrong by a few 1e-4. That is enough
+    where they are `rough`; otherwise with the first terms of their Taylor series in 1 - r^2 y^2,
+    1 / r = y (3 - r^2 y^2) / 2 and 1 / r^3 = y^3 (5 - 3 r^2 y^2) / 2, wrong by some 1e-7.
     """
     a, b, c = real(5 / 3), real(1.5), real(0.5)
 
