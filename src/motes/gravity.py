@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from motes.errors import likely
 from motes.interact.gravity.direct import direct
-from motes.interact.gravity.multipole import Units, multipole
+from motes.interact.gravity.multipole import SINGLE_FROM, Units, multipole
 from motes.interact.gravity.softening import SUPPORT, center_depth
 from motes.interact.gravity.survey import of_columns
 from motes.interact.gravity.tree import Box
@@ -203,12 +203,15 @@ def crossover(tolerance: float, dtype: np.dtype[Any]) -> float:
     """Number of particles from which the multipole method is faster than direct sums.
 
     A fit to measurements on a processor with AVX2, where both take as long (two cores, a Plummer
-    sphere): 7 900, 14 000 in single precision at 1e-3, 1e-5; 3 100, 4 700, 17 000 in double at
-    1e-3, 1e-5, 1e-8.
+    sphere): 8 500, 14 000 in single precision at 1e-3, 1e-5; in double precision 2 900, 4 600, and
+    where expansions are in it too, 11 000, 22 000 at 1e-6, 1e-8.
     """
     digits = max(-math.log10(tolerance), 2.0)
-    base, growth = (7_900.0, 1.33) if dtype == np.float32 else (3_100.0, 1.36)
-    return base * math.pow(growth, digits - 3.0)
+    if dtype == np.float32:
+        return 8_500.0 * math.pow(1.28, digits - 3.0)
+    if tolerance >= SINGLE_FROM:
+        return 2_900.0 * math.pow(1.27, digits - 3.0)
+    return 11_000.0 * math.pow(1.41, digits - 6.0)
 
 
 def _points(

@@ -101,7 +101,8 @@ def plan(tolerance: float, law: str) -> Plan:
     """Order, leaf size and precision that are fast at a tolerance, found by measurement."""
     digits = -math.log10(tolerance)
     real = np.float32 if tolerance >= SINGLE_FROM else np.float64
-    order = min(max(2, int(2.25 * digits - 1.1)), HIGHEST[law != "plummer"])
+    order = int(2.5 * digits - (2.0 if real is np.float32 else 4.0))
+    order = min(max(2, order), HIGHEST[law != "plummer"])
     leaf = 52 if digits > 3.5 and real is np.float32 else 28
     return Plan(order, max(round(0.645 * order), 1), leaf, real, tolerance >= 4 * ROUGH)
 
