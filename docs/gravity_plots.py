@@ -21,11 +21,11 @@ from matplotlib.patches import Rectangle
 
 import motes
 from motes import gravity
-from motes.interact.gravity.acceptance import acceptance
-from motes.interact.gravity.lanes import LANES, read, write
+from motes.interact.gravity.acceptance import acceptance, seen
+from motes.interact.gravity.lanes import LANES, write
 from motes.interact.gravity.multipole import Plan, Problem
-from motes.interact.gravity.tree import END, FIRST, MASS, NUMBER, RADIUS, START, Box, Tree
-from motes.interact.gravity.walk import FULL
+from motes.interact.gravity.tree import END, FIRST, NUMBER, RADIUS, START, Box, Tree
+from motes.interact.gravity.walk import OPENED
 from motes.jit import jit
 from motes.machine.lanes import choose
 
@@ -51,19 +51,16 @@ IS_FAR = acceptance(ORDER, ORDER, np.float64)
 
 
 @jit(numba=False)
-def judge(balls: Any, chosen: Any, mass: Any, own: Any, stricter: Any, found: Any) -> None:
+def judge(balls: Any, chosen: Any, own: Any, stricter: Any, found: Any) -> None:
     """Write whether the chosen cells are far from the ball `own`."""
-    far, _, _ = IS_FAR(balls, chosen, read(mass, 0), own, (stricter, stricter), 1.0, 0.0, 0.0)
+    far, _ = IS_FAR(seen(balls, chosen), own, (stricter, stricter), 1.0, 0.0, 0.0)
     write(found, 0, choose(far, 1.0, 0.0))
 
 
 def is_far(tree: Tree, target: int, cell: int) -> bool:
     """Whether the walk takes a cell's expansion for a target cell."""
     chosen, found = np.full(LANES, cell, np.int32), np.zeros(LANES)
-    start, end = tree.cells[target, :2]
-    stricter = np.sqrt(max(end - start, FULL) / FULL) / ALLOWED
-    mass = np.full(LANES, tree.bodies[cell, MASS])
-    judge(tree.balls, chosen, mass, tree.balls[target], stricter, found)
+    judge(tree.balls, chosen, tree.balls[target], 1 / ALLOWED, found)
     return bool(found[0])
 
 
@@ -80,7 +77,7 @@ def met(tree: Tree, leaf: int) -> tuple[list[int], list[int]]:
             children = children_of(tree, cell)
             if is_far(tree, target, cell):
                 far.append(cell)
-            elif children and not (inner and tree.bodies[cell, RADIUS] < radius):
+            elif children and not (inner and tree.bodies[cell, RADIUS] < OPENED * radius):
                 candidates += children
             else:
                 near.append(cell)
