@@ -23,7 +23,8 @@ import motes
 from motes import gravity
 from motes.interact.gravity.acceptance import acceptance, seen
 from motes.interact.gravity.lanes import LANES, write
-from motes.interact.gravity.multipole import Plan, Problem
+from motes.interact.gravity.multipole import Problem
+from motes.interact.gravity.plan import Plan
 from motes.interact.gravity.tree import END, FIRST, NUMBER, RADIUS, START, Box, Tree
 from motes.interact.gravity.walk import OPENED
 from motes.jit import jit

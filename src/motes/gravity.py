@@ -20,7 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from motes.errors import likely
 from motes.interact.gravity.direct import direct
-from motes.interact.gravity.multipole import SINGLE_FROM, Units, multipole
+from motes.interact.gravity.multipole import Units, multipole
+from motes.interact.gravity.plan import SINGLE_FROM
 from motes.interact.gravity.softening import SUPPORT, center_depth
 from motes.interact.gravity.survey import of_columns
 from motes.interact.gravity.tree import Box

@@ -11,7 +11,8 @@ from motes import gravity
 from motes.interact.gravity.acceptance import acceptance, seen
 from motes.interact.gravity.expansions import folded, terms
 from motes.interact.gravity.lanes import LANES, write
-from motes.interact.gravity.multipole import Plan, Problem, plan
+from motes.interact.gravity.multipole import Problem
+from motes.interact.gravity.plan import Plan, plan
 from motes.interact.gravity.sample import sample_of
 from motes.interact.gravity.tree import NUMBER, SPREAD, Box, octree
 from motes.interact.gravity.upward import MANY, summarize

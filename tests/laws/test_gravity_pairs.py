@@ -6,8 +6,8 @@ from test_gravity_multipole import distributions, relative
 
 from motes import gravity
 from motes.interact.gravity.lanes import LANES
-from motes.interact.gravity.multipole import plans
 from motes.interact.gravity.pairs import attraction
+from motes.interact.gravity.plan import plans
 from motes.interact.gravity.softening import ROUGH
 
 

@@ -8,8 +8,7 @@ Computational Astrophysics and Cosmology 1 (2014) 1, for acceptance by an estima
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from queue import SimpleQueue
 from typing import Any, NamedTuple
 
@@ -17,9 +16,9 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from motes.interact.gravity.desk import Desk, Limits, desk
+from motes.interact.gravity.plan import Plan, plans
 from motes.interact.gravity.room import Room, borrowed
 from motes.interact.gravity.sample import Sample, sample_of
-from motes.interact.gravity.softening import ROUGH
 from motes.interact.gravity.translations import translations
 from motes.interact.gravity.tree import (
     START,
@@ -33,9 +32,6 @@ from motes.interact.gravity.upward import divide_work, summarize
 from motes.interact.gravity.walk import walker
 from motes.jit import blocks, each, jit, share, threads
 from motes.machine.lanes import fetch
-
-SINGLE_FROM = 4e-6
-"""Smallest tolerance that single precision keeps."""
 
 SAFETY = 0.9
 """Part of the tolerance that the likely error may use, as seen on the sample."""
@@ -60,7 +56,7 @@ ALONE = 8
 """How many times longer the walk is for a target of the sample: its ways down are for few."""
 
 TRIALS = 8
-"""Trials before all is summed in double precision, and there by pairs."""
+"""Trials of one plan."""
 
 TASKS, FEWEST_TASKS, PARTICLES_OF_A_TASK = 128, 8, 2048
 """Parts of the walk; each of the threads takes one after the other. A part costs 0.1 ms more."""
@@ -74,48 +70,6 @@ there errors fall slowly, as many are alike."""
 
 FEW_PAIRS = 1 << 22
 """Pairs of the sample's targets with all sources up to which it is compared with their sum."""
-
-HIGHEST = {True: 12, False: 8}
-"""Highest order of harmonic expansions and of others: more would not be faster."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What is chosen from the tolerance alone."""
-
-    order: int
-    """Highest degree of the expansions."""
-    low: int
-    """The same where fewer terms are enough."""
-    leaf: int
-    """Most particles in a leaf."""
-    real: type
-    """Precision of expansions and pairs; places are always in double."""
-    rough: bool = False
-    """Whether pairs may be wrong by ROUGH."""
-    opening: float = 1.0
-    """Largest (r_A + r_B) / R at which expansions are used, whatever their estimate."""
-
-
-def plan(tolerance: float, law: str) -> Plan:
-    """Order, leaf size and precision that are fast at a tolerance, found by measurement."""
-    digits = -math.log10(tolerance)
-    real = np.float32 if tolerance >= SINGLE_FROM else np.float64
-    order = int(2.5 * digits - (2.0 if real is np.float32 else 4.0))
-    order = min(max(2, order), HIGHEST[law != "plummer"])
-    leaf = 52 if digits > 3.5 and real is np.float32 else 28
-    return Plan(order, max(round(0.645 * order), 1), leaf, real, tolerance >= 4 * ROUGH)
-
-
-def plans(tolerance: float, law: str) -> Iterator[Plan]:
-    """The plan, and those that are left if it does not keep the tolerance: large forces that nearly
-    cancel, as on a lattice, leave the errors of their pairs."""
-    first = plan(tolerance, law)
-    yield first
-    if first.rough:
-        yield replace(first, rough=False)
-    if first.real is np.float32:
-        yield replace(first, rough=False, real=np.float64)
 
 
 class Units(NamedTuple):

@@ -14,7 +14,8 @@ from motes.interact.gravity.tree import MASS, RADIUS, Tree
 
 if TYPE_CHECKING:
     from motes.interact.gravity.desk import Limits
-    from motes.interact.gravity.multipole import Plan, Problem
+    from motes.interact.gravity.multipole import Problem
+    from motes.interact.gravity.plan import Plan
 
 GROWN = 1.1
 """Growth of the leaves' radii from which a tree is made anew."""
