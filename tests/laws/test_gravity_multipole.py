@@ -13,7 +13,7 @@ from motes.interact.gravity.expansions import folded, terms
 from motes.interact.gravity.lanes import LANES, write
 from motes.interact.gravity.multipole import Problem
 from motes.interact.gravity.plan import Plan, plan
-from motes.interact.gravity.sample import sample_of
+from motes.interact.gravity.sample import Sample, sample_of
 from motes.interact.gravity.tree import NUMBER, SPREAD, Box, octree
 from motes.interact.gravity.upward import MANY, summarize
 from motes.jit import jit
@@ -96,6 +96,15 @@ def test_large_forces_that_cancel_are_summed_in_double_precision():
     a = gravity.acceleration(x, m, tolerance=1e-4, method="multipole")
     total = (m[:, None] * a).sum(axis=0)
     assert np.abs(total).max() < 1e-4 * (m[:, None] * np.abs(a)).sum()
+
+
+def test_large_values_count_as_four_times_what_is_usual():
+    """Fifteen sixteenths are 1 and the rest a thousand, which count as 4 times 15/16."""
+    n = 1600
+    sample = Sample(*[np.zeros((0, 2), np.int64)] * 2, np.ones(n), *[np.zeros(0, np.intp)] * 2)
+    values = np.where(np.arange(n) % 16, 1.0, 1000.0)
+    assert sample.mean_of_most(values) == pytest.approx((15 + 4 * 15 / 16) / 16, rel=1e-12)
+    assert sample.mean_of_most(np.zeros(n)) == 0.0
 
 
 def test_the_sample_sees_a_pull_on_the_whole():

@@ -127,6 +127,7 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
         for k in range(low, high):
             leaf = desk.candidates[k]
             first, last = cells[leaf, START], cells[leaf, END]
+            # They are packed next, when they all have come.
             for row in range(4):
                 fetch(near[row], first)
                 fetch(near[row], last - 1)

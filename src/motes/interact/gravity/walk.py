@@ -39,10 +39,11 @@ from motes.interact.gravity.tree import (
 )
 from motes.jit import EXACT, jit
 from motes.machine.lanes import bits, choose, fetch, lowest, put_some
+from motes.memory import LINE
 
-LINE, LARGE = 16, 64
-"""Numbers that come from memory together, and those of an expansion from which it is announced that
-it will be read."""
+LARGE = 64
+"""Numbers of an expansion from which it is announced that it will be read: few come unannounced in
+time."""
 
 OPENED = 1.25
 """Radius of a source cell, in radii of the target cell, from which it is divided first."""
@@ -91,7 +92,7 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
     harmonic = law != "plummer"
     operations = translations(order, harmonic)
     local_to_local, basis = operations.local_to_local, operations.basis
-    large_rows = basis > LARGE
+    is_large, of_a_line = basis > LARGE, LINE // np.dtype(real).itemsize
     lanes_to_local, local_to_particles = operations.lanes_to_local, operations.local_to_particles
     expand = _expander(operations)
     expand_easily = _expander(translations(low_order, harmonic))
@@ -153,9 +154,9 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
             separate = separate & valid
             remain = valid & ~separate
             more = put_some(far, accepted, some, separate & ~low_order_does)
-            if large_rows:
+            if is_large:
                 for k in range(accepted, accepted + more):
-                    for part in range(0, basis, LINE):
+                    for part in range(0, basis, of_a_line):
                         fetch(sources.moments[far[k]], part)
             accepted += more
             easily += put_some(easy, easily, some, separate & low_order_does)
