@@ -16,6 +16,7 @@ from motes.interact.gravity.softening import center_depth, pair_law
 from motes.interact.gravity.tree import END, MASS, RADIUS, START, Tree, X, Y, Z
 from motes.jit import EXACT, jit
 from motes.machine.lanes import fetch, total
+from motes.memory import LINE
 
 ROUNDING = 6e-8
 """Change of a difference of coordinates by single precision, in units of the largest of them."""
@@ -41,7 +42,7 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
     In single precision, coordinates are taken from the leaf's center, and a target for which their
     rounding might matter, because a source is very close, is summed again in double precision.
     """
-    single = real is np.float32
+    single, of_a_line = real is np.float32, LINE // np.dtype(real).itemsize
     attract = attraction(law, real, potential, bound=single)
     attract_roughly = attraction(law, real, potential, bound=single, rough=single)
     exact = pair_law(law, np.float64)
@@ -92,7 +93,7 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
             blur = 2.0 * ROUNDING * (distance + targets.bodies[cell, RADIUS])
             for i in range(count):
                 if potential and own[0] <= i < own[1] and depth > 0.0:
-                    part[4, i] += targets.near[3, start + i] * (depth / limits.size)
+                    part[4, i] += targets.near[4 * start + 3 * count + i] * (depth / limits.size)
                 x = part[0, i]
                 if not blur * part[3, i] <= limits.rounding or x != x:
                     place = targets.place[:, start + i]
@@ -113,14 +114,13 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
         source, target, spans = desk.source, desk.target, desk.spans
         new_x, new_y, new_z, new_m = source[0], source[1], source[2], source[3]
         near = sources.near
-        old_x, old_y, old_z, old_m = near[0], near[1], near[2], near[3]
         x, y, z = targets.bodies[cell, X], targets.bodies[cell, Y], targets.bodies[cell, Z]
         radius = targets.bodies[cell, RADIUS]
         start = targets.cells[cell, START]
         count = targets.cells[cell, END] - start
         for axis in range(3):
             for i in range(0, count, LANES):
-                write(target[axis], i, read(targets.near[axis], start + i))
+                write(target[axis], i, read(targets.near, 4 * start + axis * count + i))
         # Rounding is in proportion to the largest coordinate of what is summed together, and large
         # leaves around a small one would make it large for all: they are summed apart.
         least, reaches = 1e300, desk.reaches
@@ -128,9 +128,9 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
             leaf = desk.candidates[k]
             first, last = cells[leaf, START], cells[leaf, END]
             # They are packed next, when they all have come.
-            for row in range(4):
-                fetch(near[row], first)
-                fetch(near[row], last - 1)
+            for row in range(4 * first, 4 * last, of_a_line):
+                fetch(near, row)
+            fetch(near, 4 * last - 1)
             reach = reach_of(bodies[leaf], x, y, z)
             reaches[k - low] = reach
             if not (same and leaf == cell):
@@ -146,6 +146,7 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
                     left = True
                     continue
                 first, last = cells[leaf, START], cells[leaf, END]
+                many, place = last - first, 4 * first
                 itself = same and leaf == cell
                 if itself and radius == 0.0:
                     if potential and depth > 0.0:
@@ -165,12 +166,14 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
                         own = (first - start, first - start + taken, packed - (first - start))
                     # The last lanes may hold more than this leaf; what follows overwrites them.
                     for i in range(0, taken, LANES):
-                        write(new_x, packed + i, read(old_x, first + i) + sx)
-                        write(new_y, packed + i, read(old_y, first + i) + sy)
-                        write(new_z, packed + i, read(old_z, first + i) + sz)
-                        write(new_m, packed + i, read(old_m, first + i))
+                        old = place + i
+                        write(new_x, packed + i, read(near, old) + sx)
+                        write(new_y, packed + i, read(near, old + many) + sy)
+                        write(new_z, packed + i, read(near, old + 2 * many) + sz)
+                        write(new_m, packed + i, read(near, old + 3 * many))
                     spans[pieces, 0], spans[pieces, 1] = first, first + taken
-                    pieces, packed, first = pieces + 1, packed + taken, first + taken
+                    pieces, packed = pieces + 1, packed + taken
+                    first, place = first + taken, place + taken
                     if packed == SOURCES:
                         sum_packed(
                             targets, sources, cell, packed, pieces, distance, own, limits, desk

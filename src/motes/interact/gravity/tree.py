@@ -67,7 +67,8 @@ class Tree(NamedTuple):
     place: NDArray[np.float64]
     """(4, n) x, y, z, m"""
     near: NDArray[Any]
-    """(4, n + lanes) x, y, z, m for pairs: in single precision from the leaf's center."""
+    """(4 n + lanes,) for pairs, in single precision from the leaf's center: all x of a leaf's
+    particles, then all y, z and m, from 4 START on, so that few lines of memory hold them."""
     moments: NDArray[Any]
     """(cells, padded basis)"""
 

@@ -141,12 +141,13 @@ def _measurer(order: int) -> Callable[..., None]:
 def _approach(tree: Tree, cell: Any, relative: bool) -> None:
     """Write a leaf's particles as the pairs see them."""
     start, end = tree.cells[cell, START], tree.cells[cell, END]
+    rows = tree.near[4 * start : 4 * end].reshape((4, end - start))
     for axis in range(3):
-        old, new = tree.place[axis, start:end], tree.near[axis, start:end]
+        old, new = tree.place[axis, start:end], rows[axis]
         center = tree.bodies[cell, axis] if relative else 0.0
         for i in range(old.size):
             new[i] = old[i] - center
-    old, new = tree.place[3, start:end], tree.near[3, start:end]
+    old, new = tree.place[3, start:end], rows[3]
     for i in range(old.size):
         new[i] = old[i]
 
@@ -172,13 +173,15 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
         body, near, kind = tree.bodies[cell], tree.near, tree.near.dtype.type
         scale, zero = kind(1.0 / cell_unit(body[RADIUS])), kind(0)
         sums[:] = 0
-        for first in range(start, end, LANES):
-            inside = read(ascending, 0) < np.int32(end - first)
+        count = end - start
+        for first in range(0, count, LANES):
+            inside = read(ascending, 0) < np.int32(count - first)
+            row = 4 * start + first
             for axis in range(3):
                 center = kind(0.0 if relative else body[axis])
-                given = choose(inside, read(near[axis], first), center)
+                given = choose(inside, read(near, row + axis * count), center)
                 write(place[axis], 0, (center - given) * scale)
-            write(place[3], 0, choose(inside, read(near[3], first), zero))
+            write(place[3], 0, choose(inside, read(near, row + 3 * count), zero))
             particles_to_moments(place, sums)
         sums_to_moments(sums, tree.moments[cell])
 
@@ -237,8 +240,8 @@ def summarize(
     branches, stem = divide_work(tree)
     operations, fill = translations(order, harmonic), _summation(order, harmonic)
     n, rows = tree.place.shape[1], len(tree.cells) + LANES
-    near = room.array("records", (4, n + LANES), real)
-    near[:, -LANES:] = 0
+    near = room.array("records", (4 * n + LANES,), real)
+    near[-LANES:] = 0
     balls = room.array("balls", (rows, BALL), real)
     balls[-LANES:] = NOTHING
     count = len(tree.cells) + 1 if sources else 0

@@ -21,6 +21,7 @@ from motes.interact.gravity.lanes import LANES, read, write
 from motes.interact.gravity.near import near_field
 from motes.interact.gravity.translations import Translations, translations
 from motes.interact.gravity.tree import (
+    BALL,
     BALL_RADIUS,
     CHILDREN,
     COUNT,
@@ -165,8 +166,13 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
             while marks != 0:
                 other = chosen[lowest(marks)]
                 marks = marks & (marks - np.uint64(1))
-                write(opened, depth, sources.cells[other, FIRST] + ascending)
-                depth += sources.cells[other, NUMBER]
+                first, more = sources.cells[other, FIRST], sources.cells[other, NUMBER]
+                write(opened, depth, first + ascending)
+                for child in range(first, first + more):
+                    fetch(sources.balls, BALL * child)
+                fetch(sources.cells, 4 * first)
+                fetch(sources.cells, 4 * (first + more) - 1)
+                depth += more
             if accepted >= LANES:
                 expand(sources, own, e2, far, LANES, desk)
                 accepted -= LANES
@@ -212,10 +218,11 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
         place, out, body, total = desk.place, desk.gathered, targets.bodies[cell], desk.total
         start, end = targets.cells[cell, START], targets.cells[cell, END]
         scale = real(1.0 / cell_unit(body[RADIUS]))
-        for first in range(0, end - start, LANES):
+        count = end - start
+        for first in range(0, count, LANES):
             for axis in range(3):
                 center = real(0.0 if single else body[axis])
-                near = read(targets.near[axis], start + first)
+                near = read(targets.near, 4 * start + axis * count + first)
                 write(place[axis], 0, (near - center) * scale)
             local_to_particles(place, terms, scale, out)
             for axis in range(3):
