@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.interpolate import PchipInterpolator
@@ -162,6 +162,14 @@ STEPS = st.lists(st.sampled_from([0.01, 0.3, 1.0, 5.0]), min_size=6, max_size=6)
     beyond=st.sampled_from(["hold", "loop", "pingpong"]),
     shares=st.lists(st.floats(0, 1), min_size=1, max_size=8),
 )
+@example(
+    rates=[0.0, 0.0, 7.0, 0.0, 0.5],
+    steps=[0.01] * 6,
+    start=-2.0,
+    kind="linear",
+    beyond="loop",
+    shares=[1.0],
+)
 def test_when_inverts_the_integral(rates, steps, start, kind, beyond, shares):
     """integral(when(n)) = n, and just before when(n) the integral is below n."""
     times = start + np.cumsum(steps)[: len(rates)]
@@ -170,7 +178,8 @@ def test_when_inverts_the_integral(rates, steps, start, kind, beyond, shares):
     amounts = total * np.array(shares)
     instants = spline.when(amounts)
     assert (instants >= 0).all()
-    assert (instants <= 30 + 1e-9).all()
+    # Where the rate begins at 0, an instant is known to the root of what rounding does to amounts.
+    assert (instants <= 30 + 1e-7).all()
     reached = spline.integral(instants)
     scale = max(total, abs(spline.integral(float(times[0]))), 1e-300)
     assert (abs(reached - amounts) <= 1e-12 * scale).all()
