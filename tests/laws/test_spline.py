@@ -178,8 +178,9 @@ def test_when_inverts_the_integral(rates, steps, start, kind, beyond, shares):
     amounts = total * np.array(shares)
     instants = spline.when(amounts)
     assert (instants >= 0).all()
-    # Where the rate begins at 0, an instant is known to the root of what rounding does to amounts.
-    assert (instants <= 30 + 1e-7).all()
+    # Where the rate begins at 0, an instant is known to the root of rounding, or its third root;
+    # a stretch without any rate, at whose begin it is, is ten times longer.
+    assert (instants <= 30 + 1e-3).all()
     reached = spline.integral(instants)
     scale = max(total, abs(spline.integral(float(times[0]))), 1e-300)
     assert (abs(reached - amounts) <= 1e-12 * scale).all()

@@ -166,13 +166,15 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
             while marks != 0:
                 other = chosen[lowest(marks)]
                 marks = marks & (marks - np.uint64(1))
-                first, more = sources.cells[other, FIRST], sources.cells[other, NUMBER]
+                first = sources.cells[other, FIRST]
+                last = first + sources.cells[other, NUMBER]
                 write(opened, depth, first + ascending)
-                for child in range(first, first + more):
+                depth += last - first
+                # Children are tested next, and where theirs begin is read of those that are opened.
+                for child in range(first, last):
                     fetch(sources.balls, BALL * child)
                 fetch(sources.cells, 4 * first)
-                fetch(sources.cells, 4 * (first + more) - 1)
-                depth += more
+                fetch(sources.cells, 4 * last - 1)
             if accepted >= LANES:
                 expand(sources, own, e2, far, LANES, desk)
                 accepted -= LANES
