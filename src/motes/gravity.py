@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from motes.errors import likely
 from motes.interact.gravity.direct import direct
 from motes.interact.gravity.multipole import Units, multipole
-from motes.interact.gravity.plan import SINGLE_FROM
+from motes.interact.gravity.plan import MIXED_FROM, SINGLE_FROM
 from motes.interact.gravity.softening import SUPPORT, center_depth
 from motes.interact.gravity.survey import of_columns
 from motes.interact.gravity.tree import Box
@@ -153,7 +153,9 @@ class _Problem:
             raise ValueError(f"x spans {size:g}; it must be below {FARTHEST:g}: use other units.")
         self.length = _power_of_two(size)
         self.cube = size or 1.0
-        self.unit_mass = _power_of_two(self.total)
+        # Equal masses are then powers of two, which single precision holds to the last bit.
+        count = max(len(position), 1)
+        self.unit_mass = self.total * (_power_of_two(count) / count)
         self.position, self.points = position, points
         self.law = kernel if softening > 0.0 else "newton"
         self.size = softening * (SUPPORT if kernel == "spline" else 1.0) / self.length
@@ -203,16 +205,20 @@ class _Problem:
 def crossover(tolerance: float, dtype: np.dtype[Any]) -> float:
     """Number of particles from which the multipole method is faster than direct sums.
 
-    A fit to measurements on a processor with AVX2, where both take as long (two cores, a Plummer
-    sphere): 8 500, 14 000 in single precision at 1e-3, 1e-5; in double precision 2 900, 4 600, and
-    where expansions are in it too, 11 000, 22 000 at 1e-6, 1e-8.
+    Fits to measurements on processors with AVX2 and with AVX-512, where both take as long (two
+    cores, a Plummer sphere), which differ by a third: in single precision about 8 500, 14 000 and
+    25 000 at 1e-3, 1e-5, 1e-6; in double precision 3 300, 4 900, 6 500, 21 000 at 1e-3, 1e-5, 1e-6,
+    1e-8.
     """
     digits = max(-math.log10(tolerance), 2.0)
-    if dtype == np.float32:
-        return 8_500.0 * math.pow(1.28, digits - 3.0)
+    single = dtype == np.float32
     if tolerance >= SINGLE_FROM:
-        return 2_900.0 * math.pow(1.27, digits - 3.0)
-    return 11_000.0 * math.pow(1.41, digits - 6.0)
+        many, more, at = (8_500.0, 1.28, 3.0) if single else (3_300.0, 1.22, 3.0)
+    elif tolerance >= MIXED_FROM:
+        many, more, at = 25_000.0 if single else 6_500.0, 1.3, 6.0
+    else:
+        many, more, at = 21_000.0, 1.37, 8.0
+    return many * math.pow(more, digits - at)
 
 
 def _points(

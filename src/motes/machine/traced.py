@@ -19,13 +19,14 @@ from motes.machine.target import widest
 from motes.machine.values import Group, Known, Scalar, Value, View, Written
 
 LANES = widest()
-"""Numbers that travel together."""
+"""Numbers that travel together, but in operations that ask for another number of lanes."""
 
 FLAGS = "contract"
 """Multiply-adds may be fused; the order of sums stands, as the compiler knows no better one."""
 
-FITTING = (9, 5)
-"""Lanes that 16 registers hold besides what they are multiplied by, of one register and of two."""
+FITTING = {8: 9, 16: 20}
+"""Registers' worth of sums that fit beside what they are multiplied by, by the lanes of a register:
+there are 16 of eight lanes, 32 of sixteen."""
 
 MANY = 12
 """Rounds from which a loop is worth one: fewer are written one after the other."""
@@ -37,13 +38,13 @@ PART = 4
 class Traced(Written):
     """An operation for kernels, from a formula of arrays and numbers.
 
-    A two-dimensional array is seen as rows of LANES numbers, `rows[k]`, a one-dimensional one as
+    A two-dimensional array is seen as rows of `lanes` numbers, `rows[k]`, a one-dimensional one as
     numbers. Both may be assigned to. With lanes, a number is that number in each lane. What the
     formula returns, lanes or a tuple of them, the operation returns.
     """
 
-    def __init__(self, formula: Callable[..., Any]) -> None:
-        self.formula = formula
+    def __init__(self, formula: Callable[..., Any], lanes: int) -> None:
+        self.formula, self.lanes = formula, lanes
         self.__name__ = formula.__name__
 
     def __call__(self, *arguments: Any) -> Any:
@@ -53,16 +54,16 @@ class Traced(Written):
 
     def write(self, writer: Any, values: Sequence[Value]) -> Value:
         """The operation's code, for arguments in registers."""
-        given = [_wire(writer, value) for value in values]
+        given = [_wire(writer, value, self.lanes) for value in values]
         found = self.formula(*given)
         if isinstance(found, tuple):
             return Group(tuple(wire.value for wire in found))
         return Known(None) if found is None else found.value
 
 
-def traced(formula: Callable[..., Any]) -> Callable[..., Any]:
+def traced(formula: Callable[..., Any], lanes: int = LANES) -> Callable[..., Any]:
     """A formula as an operation."""
-    return Traced(formula)
+    return Traced(formula, lanes)
 
 
 class Wire:
@@ -100,10 +101,10 @@ class Wire:
 class _Array:
     """An array in a formula."""
 
-    def __init__(self, writer: Any, view: View) -> None:
+    def __init__(self, writer: Any, view: View, across: int) -> None:
         if not view.type.packed:
             raise Unsupported("formulas take packed arrays only")
-        self.writer, self.view, self.item = writer, view, view.type.item
+        self.writer, self.view, self.item, self.across = writer, view, view.type.item, across
         self.width = view.shape[1] if view.type.axes == 2 else ""
 
     def lanes(self, place: str, kind: Number) -> Scalar:
@@ -127,16 +128,18 @@ class _Array:
 
 
 class _Rows(_Array):
-    """An array of two axes: rows of LANES numbers."""
+    """An array of two axes: rows of `across` numbers."""
 
     def _first(self, row: Any) -> str:
-        return str(row * LANES) if isinstance(row, int) else product(self.writer, row, str(LANES))
+        if isinstance(row, int):
+            return str(row * self.across)
+        return product(self.writer, row, str(self.across))
 
     def __getitem__(self, row: Any) -> Wire:
-        return Wire(self.writer, self.lanes(self._first(row), self.item.over(LANES)))
+        return Wire(self.writer, self.lanes(self._first(row), self.item.over(self.across)))
 
     def __setitem__(self, row: Any, wire: Wire) -> None:
-        self.put(self._first(row), self.writer.cast(wire.value, self.item.over(LANES)))
+        self.put(self._first(row), self.writer.cast(wire.value, self.item.over(self.across)))
 
 
 class _Terms(_Array):
@@ -159,9 +162,9 @@ def place(writer: Any, a: str, b: Any) -> str:
     return str(writer.do(f"add nsw i64 {a}, {b}"))
 
 
-def _wire(writer: Any, value: Value) -> Any:
+def _wire(writer: Any, value: Value, lanes: int) -> Any:
     if isinstance(value, View):
-        return (_Rows if value.type.axes == 2 else _Terms)(writer, value)
+        return (_Rows if value.type.axes == 2 else _Terms)(writer, value, lanes)
     if not isinstance(value, Scalar):
         raise Unsupported("formulas take arrays and numbers")
     return writer.cast(value, INT).text if value.type.whole else Wire(writer, value)
@@ -197,12 +200,9 @@ def repeated(
     return [Wire(writer, value) for value in found]
 
 
-def held(lanes: Any) -> int:
-    """How many of such lanes registers hold, with some to spare."""
-    if not isinstance(lanes, Wire):
-        return FITTING[0]
-    several = lanes.value.type.bits * widest() > 256 and widest() == 8
-    return FITTING[several]
+def held() -> int:
+    """How many lanes, each a register full, can be summed at once."""
+    return FITTING[widest()]
 
 
 def shifted(array: Any, row: Any, shifts: Sequence[int]) -> list[Any]:
@@ -217,6 +217,13 @@ def whole(numbers: Any, k: Any) -> Any:
     if not isinstance(numbers, _Array):
         return int(numbers[k])
     return numbers.writer.cast(numbers.lanes(str(k), INT32), INT).text
+
+
+def like(lanes: Any, other: Any) -> Any:
+    """The same in the precision of others."""
+    if not isinstance(lanes, Wire):
+        return np.asarray(lanes, other.dtype)
+    return Wire(lanes.writer, lanes.writer.cast(lanes.value, other.value.type))
 
 
 def zeros(like: Any) -> Any:
@@ -262,19 +269,19 @@ def total(lanes: Any) -> Any:
     return Wire(lanes.writer, lanes.writer.total(lanes.value))
 
 
-def gathered(table: Any, chosen: Any, count: int) -> Sequence[Any]:
+def gathered(table: Any, chosen: Any, count: int, lanes: int = LANES) -> Sequence[Any]:
     """The first `count` columns of a table, lane k from row chosen[k]; its width fills PARTs."""
     if not isinstance(table, _Array):
-        return [table[chosen[:LANES], column].copy() for column in range(count)]
-    part = gathering(table, chosen)
+        return [table[chosen[:lanes], column].copy() for column in range(count)]
+    part = gathering(table, chosen, lanes)
     return [column for first in range(0, count, PART) for column in part(first)][:count]
 
 
-def gathering(table: Any, chosen: Any) -> Callable[[int], list[Wire]]:
+def gathering(table: Any, chosen: Any, lanes: int) -> Callable[[int], list[Wire]]:
     """Function that gathers PART columns of a table, from a given one on."""
     writer, small = table.writer, table.item.over(PART)
     starts = []
-    for lane in range(LANES):
+    for lane in range(lanes):
         number = writer.cast(chosen.lanes(str(lane), INT32), INT)
         starts.append(table.row(number.text))
 
@@ -282,11 +289,11 @@ def gathering(table: Any, chosen: Any) -> Callable[[int], list[Wire]]:
         parts = [table.lanes(place(writer, start, first), small) for start in starts]
         # Parts k, k + 4, k + 8 ... end to end; then columns, in each part apart from the others.
         a, b, c, d = (_joined(writer, parts[k::PART]) for k in range(PART))
-        low, high = (0, LANES, 1, LANES + 1), (2, LANES + 2, 3, LANES + 3)
+        low, high = (0, lanes, 1, lanes + 1), (2, lanes + 2, 3, lanes + 3)
         ab, ab_, cd, cd_ = (
             _by_parts(writer, *pair, places) for pair in ((a, b), (c, d)) for places in (low, high)
         )
-        left, right = (0, 1, LANES, LANES + 1), (2, 3, LANES + 2, LANES + 3)
+        left, right = (0, 1, lanes, lanes + 1), (2, 3, lanes + 2, lanes + 3)
         return [
             Wire(writer, _by_parts(writer, *pair, places))
             for pair in ((ab, cd), (ab_, cd_))
@@ -312,22 +319,23 @@ def _joined(writer: Any, parts: list[Scalar]) -> Scalar:
 
 def _by_parts(writer: Any, a: Scalar, b: Scalar, places: tuple[int, ...]) -> Scalar:
     """The same shuffle in each part of two vectors, which a processor does in one step."""
-    return _shuffle(writer, a, b, [k + p for k in range(0, LANES, PART) for p in places])
+    return _shuffle(writer, a, b, [k + p for k in range(0, a.type.lanes, PART) for p in places])
 
 
 def scattered(columns: Sequence[Any], table: Any, first: Any) -> None:
     """Write lane k of all columns to row `first` + k of a table, whose width fills lanes."""
     if not isinstance(table, _Array):
         for column, values in enumerate(columns):
-            table[first : first + LANES, column] = values
+            table[first : first + len(values), column] = values
         return
-    whole = [*columns, *[columns[-1]] * (-len(columns) % LANES)]
-    for begin in range(0, len(whole), LANES):
-        scatter(whole[begin : begin + LANES], table, first, begin)
+    lanes = columns[0].value.type.lanes
+    whole = [*columns, *[columns[-1]] * (-len(columns) % lanes)]
+    for begin in range(0, len(whole), lanes):
+        scatter(whole[begin : begin + lanes], table, first, begin)
 
 
 def scatter(columns: Sequence[Any], table: Any, first: str, begin: int) -> None:
-    """Write LANES columns to a table, from column `begin` on."""
+    """Write as many columns as lanes to a table, from column `begin` on."""
     writer = table.writer
     for lane, row in enumerate(_transposed(writer, [column.value for column in columns])):
         start = table.row(place(writer, first, lane))
@@ -335,11 +343,12 @@ def scatter(columns: Sequence[Any], table: Any, first: str, begin: int) -> None:
 
 
 def _transposed(writer: Any, rows: list[Scalar]) -> list[Scalar]:
-    """A square of LANES vectors, in log2(LANES) rounds that interleave the halves."""
-    half = LANES // 2
-    low = [v for k in range(half) for v in (k, k + LANES)]
+    """A square of vectors, in log2(lanes) rounds that interleave the halves."""
+    lanes = len(rows)
+    half = lanes // 2
+    low = [v for k in range(half) for v in (k, k + lanes)]
     high = [v + half for v in low]
-    for _ in range(LANES.bit_length() - 1):
+    for _ in range(lanes.bit_length() - 1):
         rows = [
             _shuffle(writer, rows[k], rows[k + half], places)
             for k in range(half)

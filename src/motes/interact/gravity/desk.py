@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from motes.interact.gravity.expansions import ROOM, places
 from motes.interact.gravity.lanes import LANES
 from motes.interact.gravity.morton import LEVELS
-from motes.interact.gravity.translations import Translations, padded
+from motes.interact.gravity.translations import FAMILY, Translations, padded, width
 from motes.memory import allocate
 
-SOURCES = 1536
-"""Sources that are packed for one sum over pairs: in single precision they fit the first cache."""
+SOURCES = {False: 1536, True: 1024}
+"""Sources that are packed for one sum over pairs, of four numbers or of seven with coordinates in
+two parts: in single precision they fit the first cache."""
 
 _STACK = 8 * LANES * (LEVELS + 2) + LANES
 
@@ -30,6 +31,8 @@ class Limits(NamedTuple):
     """How many times less may be neglected where the lower order is used."""
     force: float
     """Largest estimated error of that times the mass of the target cell: of its momentum."""
+    alike: float
+    """Largest estimated error of that times the root of the number of targets that share it."""
     rounding: float
     """Largest error of the acceleration by rounded coordinates in one sum over pairs."""
     rough: bool
@@ -48,7 +51,9 @@ class Desk(NamedTuple):
     """Working memory of one walk."""
 
     place: NDArray[Any]
-    """(5, lanes) what `Translations` take: coordinates, a factor, and a radius."""
+    """(5, width) what `Translations` take: coordinates, a factor, and a radius."""
+    children: NDArray[Any]
+    """(5, FAMILY) the same of a cell's children."""
     chosen: NDArray[np.int32]
     """(lanes,) source cells that are tested together."""
     ascending: NDArray[np.int32]
@@ -68,28 +73,34 @@ class Desk(NamedTuple):
     places: NDArray[np.int32]
     """Rows of `room` that moments are multiplied by."""
     room: NDArray[Any]
-    """(ROOM, lanes) what `moments_to_local` needs room for."""
+    """(ROOM, width) what `moments_to_local` needs room for."""
+    high_room: NDArray[np.float32]
+    """(ROOM, lanes) the same in single precision, for products of high degree."""
+    high: NDArray[np.float32]
+    """(basis, lanes) what these add to local terms."""
     gathered: NDArray[Any]
-    """(basis, lanes) local terms being summed."""
+    """(basis, width) local terms being summed."""
     target: NDArray[Any]
-    """(3, largest leaf) targets as the pair law sees them."""
+    """(6, largest leaf) targets as the pair law sees them, coordinates in one part or two."""
     source: NDArray[Any]
-    """(4, SOURCES + lanes) packed sources: x, y, z, m."""
+    """(7, SOURCES + lanes) packed sources: x, y, z, m, and second parts of coordinates."""
     spans: NDArray[np.int32]
     """(SOURCES, 2) which particles they are."""
     part: NDArray[Any]
     """(5, largest leaf) sums over packed sources."""
     total: NDArray[Any]
     """(5, largest leaf) sums over all sources."""
-    exact: NDArray[np.float64]
-    """(4, lanes) some sources in double precision."""
 
 
-def desk(operations: Translations, harmonic: bool, real: type, largest: int, capacity: int) -> Desk:
+def desk(
+    operations: Translations, harmonic: bool, real: type, mixed: bool, largest: int, capacity: int
+) -> Desk:
     """Working memory for target leaves of at most `largest` and `capacity` candidates."""
-    width = -(-largest // LANES) * LANES
+    pairs = np.float32 if mixed else real
+    columns, lanes = -(-largest // LANES) * LANES, width(real)
     return Desk(
-        place=np.ones((5, LANES), real),
+        place=np.ones((5, lanes), real),
+        children=np.ones((5, FAMILY), real),
         chosen=np.zeros(LANES, np.int32),
         ascending=np.arange(LANES, dtype=np.int32),
         far=np.zeros((2, 3 * LANES), np.int32),
@@ -99,12 +110,13 @@ def desk(operations: Translations, harmonic: bool, real: type, largest: int, cap
         opened=np.zeros(_STACK, np.int32),
         local=np.zeros((_STACK, padded(operations.basis)), real),
         places=np.array(places(harmonic), np.int32),
-        room=allocate((ROOM, LANES), real, "expansions"),
-        gathered=allocate((operations.basis, LANES), real, "expansions"),
-        target=np.zeros((3, width), real),
-        source=np.zeros((4, SOURCES + LANES), real),
-        spans=np.empty((SOURCES, 2), np.int32),
-        part=np.zeros((5, width), real),
-        total=np.zeros((5, width), real),
-        exact=np.zeros((4, LANES)),
+        room=allocate((ROOM, lanes), real, "expansions"),
+        high_room=allocate((ROOM if mixed else 0, LANES), np.float32, "expansions"),
+        high=allocate((operations.basis if mixed else 0, LANES), np.float32, "expansions"),
+        gathered=allocate((operations.basis, lanes), real, "expansions"),
+        target=np.zeros((6, columns), pairs),
+        source=np.zeros((7, SOURCES[mixed] + LANES), pairs),
+        spans=np.empty((SOURCES[mixed], 2), np.int32),
+        part=np.zeros((5, columns), real),
+        total=np.zeros((5, columns), real),
     )

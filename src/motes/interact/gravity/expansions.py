@@ -29,7 +29,7 @@ TOGETHER = 6
 """Sums that are formed together: as many as registers hold, with what they share."""
 
 
-SIDE = {True: 13, False: 9}
+SIDE = {True: 15, False: 9}
 """Derivatives along an axis from 0 up, of harmonic and other potentials."""
 
 MOMENTS = max(3 * SIDE[True] ** 2, SIDE[False] ** 3)
@@ -183,14 +183,22 @@ def places(harmonic: bool) -> list[int]:
     return [row_of(b, harmonic) for b in without_first(terms(SIDE[harmonic] - 1, harmonic).basis)]
 
 
-def stairs(kind: Terms, most: int) -> list[tuple[range, list[tuple[range, int, int]]]]:
-    """Which a and b the sums over b of M_b D_{a+b}, |a| + |b| <= p, are over, step by step.
+def stairs(
+    kind: Terms, most: int, above: int = -1
+) -> list[tuple[range, list[tuple[range, int, int]]]]:
+    """Which a and b the sums over b of M_b D_{a+b}, above < |a| + |b| <= p, are over, step by step.
 
     For places of up to `most` a in the basis each: steps of some of them, and the first and
-    last + 1 of the b among `without_first`, all of which go with all a of the step.
+    last + 1 of the b among `without_first`, all of which go with all a of the step. `above` is at
+    most p.
     """
     order, basis = kind.order, kind.basis
     ends = [sum(sum(b) <= degree for b in without_first(basis)) for degree in range(order + 1)]
+
+    def partners(n: int) -> tuple[int, int]:
+        degree = sum(basis[n])
+        return ends[above - degree] if above >= degree else 0, ends[order - degree]
+
     steps, first = [], 0
     while first < len(basis):
         degree = sum(basis[first])
@@ -200,13 +208,12 @@ def stairs(kind: Terms, most: int) -> list[tuple[range, list[tuple[range, int, i
         parts = -(-(last - first) // most)
         cuts = [first + (last - first) * k // parts for k in range(parts + 1)]
         for low, high in pairwise(cuts):
-            begin, some = 0, []
-            for highest in range(degree, sum(basis[low]) - 1, -1):
-                end = ends[order - highest]
-                if begin < end:
-                    those = sum(sum(a) <= highest for a in basis[:high])
-                    some.append((range(low, those), begin, end))
-                begin = end
+            found = {n: partners(n) for n in range(low, high)}
+            some = []
+            for begin, end in pairwise(sorted({b for pair in found.values() for b in pair})):
+                those = [n for n, (b, e) in found.items() if b <= begin and end <= e]
+                if those:
+                    some.append((range(those[0], those[-1] + 1), begin, end))
             steps.append((range(low, high), some))
         first = last
     return steps

@@ -236,7 +236,7 @@ def morton_order(
         )  # fmt: skip
 
     share(scatter, number)
-    place = room.array("place", (4, n))
+    place = room.columns("place", 4, n)
     width = max(parts // 64, 1)
     tails = [(first, min(first + width, parts)) for first in range(0, parts, width)]
     each(_arrange_parts, (body, tag, starts, key, order, place), tails)

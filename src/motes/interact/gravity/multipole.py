@@ -43,6 +43,10 @@ would be missed by the sample."""
 MOMENTUM = 0.1
 """The same of the sum of all m a: a sun's hangs on few expansions, whose errors do not cancel."""
 
+ALIKE = 0.1
+"""The same of an error that all targets share, in the mean square: where it is of few leaves, the
+sample might miss it."""
+
 ENOUGH = 5.0
 """How much less it must neglect at least, or it is made again."""
 
@@ -58,7 +62,7 @@ ALONE = 8
 TRIALS = 8
 """Trials of one plan."""
 
-TASKS, FEWEST_TASKS, PARTICLES_OF_A_TASK = 128, 8, 2048
+TASKS, FEWEST_TASKS, PARTICLES_OF_A_TASK = 128, 8, 6144
 """Parts of the walk; each of the threads takes one after the other. A part costs 0.1 ms more."""
 
 BLOCK, AHEAD = 1 << 14, 16
@@ -118,7 +122,7 @@ def multipole(
             limits = problem.limits_for(tolerance)
             if limits:
                 break
-        limits = limits or problem.limits(0.0, 0.0, 0.0)
+        limits = limits or problem.limits(0.0, 0.0, 0.0, 0.0)
         trees.keep(kind, problem, limits)
         return problem.unsorted(problem.solve(limits), units, source.dtype)
 
@@ -160,7 +164,7 @@ class Problem:
             tree = regrown(source, mass, box, again.sources, room)
         else:
             tree = octree(source, mass, box, plan.leaf, room)
-        sources = summarize(tree, *kind, True, room)
+        sources = summarize(tree, *kind, True, room, plan.mixed)
         targets = sources
         if target is not None:
             equal = np.full(len(target), box.mass / len(target))
@@ -173,13 +177,14 @@ class Problem:
         out = room.array("sums", (4 if potential else 3, targets.place.shape[1]), plan.real)
         return Problem(targets, sources, law, size, potential, plan, out)
 
-    def limits(self, error: float, force: float, rounding: float) -> Limits:
+    def limits(self, error: float, force: float, alike: float, rounding: float) -> Limits:
         """Limits of the walk; those that depend on the particles alone are filled in."""
         return Limits(
             opening2=self.plan.opening**2,
             error=error,
             easier=EASIER,
             force=force,
+            alike=alike,
             rounding=rounding,
             rough=self.plan.rough,
             few=max(self.plan.order**3 // 2, 16),
@@ -195,29 +200,33 @@ class Problem:
         to what one expansion may neglect. A few leaves cost little, whatever n.
         """
         sample = sample_of(self.targets)
-        a = _lengths(self._at(sample, self.limits(math.inf, math.inf, math.inf)))
+        a = _lengths(self._at(sample, self.limits(math.inf, math.inf, math.inf, math.inf)))
         scale = sample.typical(a)
         pulled = a * self.targets.place[3, sample.rows]
         force = sample.mean_of_most(pulled) * self.targets.place.shape[1] or math.inf
         rounding = tolerance * scale
+        alike = ALIKE * rounding * math.sqrt(self.targets.place.shape[1])
         stricter = STRICTER if self.plan.order >= LOW_ORDER else STRICTEST
         share, strictest = tolerance * FIRST, math.inf
+        # What pairs are compared with is in double precision where the plan is a mixture.
+        strict_rounding = 0.0 if self.plan.mixed else rounding / stricter
         if len(sample.rows) * self.sources.place.shape[1] <= FEW_PAIRS:
             strictest = 0.0
-            pairs = self.limits(0.0, 0.0, rounding / stricter)
+            pairs = self.limits(0.0, 0.0, 0.0, strict_rounding)
             exact = self._at(sample, pairs._replace(rough=False))
         # The walk over all takes time in proportion to part^(-1/3); a trial costs ALONE its share.
         trial = ALONE * len(sample.rows) / self.targets.place.shape[1]
         enough, kept = AIM * max(1.0 - trial, 0.0) ** 3, None
         for _ in range(TRIALS):
-            limits = self.limits(share * scale, MOMENTUM * tolerance * force, rounding)
+            limits = self.limits(share * scale, MOMENTUM * tolerance * force, alike, rounding)
             if share < ENOUGH * strictest:
                 strictest = share / stricter
                 strict = limits._replace(
                     opening2=limits.opening2 / 2,
                     error=strictest * scale,
                     force=limits.force / stricter,
-                    rounding=rounding / stricter,
+                    alike=alike / stricter,
+                    rounding=strict_rounding,
                     rough=False,
                 )
                 exact = self._at(sample, strict)
@@ -256,13 +265,15 @@ class Problem:
 
     def _walk(self, parts: list[NDArray[np.int64]], limits: Limits) -> NDArray[Any]:
         """Sums at targets, whole leaves; each part is ranges (k, 2) of rows and one task."""
-        walk = walker(self.law, self.plan.real, self.potential, self.plan.order, self.plan.low)
-        operations = translations(self.plan.order, self.law != "plummer")
+        plan = self.plan
+        kind = plan.real, plan.mixed
+        walk = walker(self.law, *kind, self.potential, plan.order, plan.low)
+        operations = translations(plan.order, self.law != "plummer", plan.real)
         same, largest, out = self.targets is self.sources, self.targets.largest, self.out
         harmonic = self.law != "plummer"
 
         def new(candidates: int) -> Desk:
-            return desk(operations, harmonic, self.plan.real, largest, candidates)
+            return desk(operations, harmonic, *kind, largest, candidates)
 
         desks: SimpleQueue[Desk] = SimpleQueue()
         for _ in range(threads()):

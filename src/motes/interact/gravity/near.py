@@ -10,17 +10,13 @@ from typing import Any
 import numpy as np
 
 from motes.interact.gravity.desk import SOURCES, Desk, Limits
-from motes.interact.gravity.lanes import LANES, read, spread, write
-from motes.interact.gravity.pairs import attraction
-from motes.interact.gravity.softening import center_depth, pair_law
+from motes.interact.gravity.lanes import LANES, maximum, read, spread, write
+from motes.interact.gravity.packed import packed_sum
+from motes.interact.gravity.softening import center_depth
 from motes.interact.gravity.tree import END, MASS, RADIUS, START, Tree, X, Y, Z
 from motes.jit import EXACT, jit
-from motes.machine.lanes import fetch, total
+from motes.machine.lanes import fetch, largest
 from motes.memory import LINE
-
-ROUNDING = 6e-8
-"""Change of a difference of coordinates by single precision, in units of the largest of them."""
-
 
 WIDER = 16.0
 """How many times farther leaves reach that are summed apart from the nearest."""
@@ -32,95 +28,76 @@ def reach_of(body: Any, x: Any, y: Any, z: Any) -> Any:
     return max(abs(body[X] - x), abs(body[Y] - y), abs(body[Z] - z)) + body[RADIUS]
 
 
+@jit(inline=True, flags=EXACT)
+def write_parts(rows: Any, first: Any, coarse: Any, fine: Any, lanes: Any) -> None:
+    """Write lanes to two rows, rounded to single precision and what they lack then."""
+    rounded = np.float32(lanes)
+    write(rows[coarse], first, rounded)
+    write(rows[fine], first, np.float32(lanes - np.float64(rounded)))
+
+
 @cache
-def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
+def near_field(law: str, real: type, mixed: bool, potential: bool) -> Callable[..., Any]:
     """Compiled function that adds to `desk.total` the pull of source leaves on a target leaf.
 
     (targets, sources, same, cell, low, high, limits, desk) -> None: the leaves are candidates `low`
     to `high`; `same`: the trees are one.
-
-    In single precision, coordinates are taken from the leaf's center, and a target for which their
-    rounding might matter, because a source is very close, is summed again in double precision.
     """
     single, of_a_line = real is np.float32, LINE // np.dtype(real).itemsize
-    attract = attraction(law, real, potential, bound=single)
-    attract_roughly = attraction(law, real, potential, bound=single, rough=single)
-    exact = pair_law(law, np.float64)
+    pairs: Any = np.float32 if mixed else real
+    most_sources = SOURCES[mixed]
+    sum_packed = packed_sum(law, real, mixed, potential)
     depth = center_depth(law, 1.0)
-    nothing = real(0)
+    nothing = pairs(0)
 
     @jit(flags=EXACT, numba=False)
-    def sum_exactly(
-        sources: Tree, spans: Any, count: Any, place: Any, size: Any, some: Any, part: Any
-    ) -> None:
-        x, y, z = place[0], place[1], place[2]
-        sizes = size, 1.0 / size if size > 0.0 else 0.0
-        ax = ay = az = value = 0.0
-        for k in range(count):
-            for first in range(spans[k, 0], spans[k, 1], LANES):
-                some[3] = 0.0
-                for lane in range(min(LANES, spans[k, 1] - first)):
-                    for row in range(4):
-                        some[row, lane] = sources.place[row, first + lane]
-                dx, dy, dz = read(some[0], 0) - x, read(some[1], 0) - y, read(some[2], 0) - z
-                s, w = exact(dx * dx + dy * dy + dz * dz, sizes)
-                m = read(some[3], 0)
-                s = s * m
-                ax, ay, az, value = ax + s * dx, ay + s * dy, az + s * dz, value + w * m
-        part[0], part[1], part[2], part[4] = total(ax), total(ay), total(az), total(value)
-
-    @jit(flags=EXACT, numba=False)
-    def sum_packed(
-        targets: Tree, sources: Tree, cell: Any, packed: Any, spans: Any, distance: Any, own: Any,
-        limits: Limits, desk: Desk,
-    ) -> None:  # fmt: skip
-        start = targets.cells[cell, START]
+    def lay_out(targets: Tree, cell: Any, desk: Desk) -> None:
+        """Write the targets as the pair law sees them."""
+        start, target = targets.cells[cell, START], desk.target
         count = targets.cells[cell, END] - start
-        part, source = desk.part, desk.source
-        # Massless sources where no target is make the number a multiple of the lanes.
         for axis in range(3):
-            write(source[axis], packed, spread(real(4.0 * distance)))
-        write(source[3], packed, spread(nothing))
-        packed = (packed + LANES - 1) // LANES * LANES
-        part[:] = 0
-        size = real(limits.size)
-        if single and limits.rough:
-            attract_roughly(desk.target, count, source, packed, own, size, part)
-        else:
-            attract(desk.target, count, source, packed, own, size, part)
-        if single:
-            # Twice the change of s dx by coordinates that are wrong by a little.
-            blur = 2.0 * ROUNDING * (distance + targets.bodies[cell, RADIUS])
-            for i in range(count):
-                if potential and own[0] <= i < own[1] and depth > 0.0:
-                    part[4, i] += targets.near[4 * start + 3 * count + i] * (depth / limits.size)
-                x = part[0, i]
-                if not blur * part[3, i] <= limits.rounding or x != x:
-                    place = targets.place[:, start + i]
-                    sum_exactly(
-                        sources, desk.spans, spans, place, limits.size, desk.exact, part[:, i]
+            for i in range(0, count, LANES):
+                place = read(targets.near, 4 * start + axis * count + i)
+                if mixed:
+                    write_parts(target, i, axis, 3 + axis, place - targets.bodies[cell, axis])
+                else:
+                    write(target[axis], i, place)
+
+    @jit(flags=EXACT, numba=False)
+    def pack(
+        near: Any, place: Any, many: Any, taken: Any, center: Any, shift: Any, packed: Any,
+        desk: Desk,
+    ) -> Any:  # fmt: skip
+        """Write `taken` particles of a leaf of `many` to `desk.source`; return the largest mass."""
+        source = desk.source
+        heaviest = spread(nothing)
+        # The last lanes may hold more than this leaf; what follows overwrites them.
+        for i in range(0, taken, LANES):
+            old, new = place + i, packed + i
+            m = pairs(read(near, old + 3 * many))
+            if mixed:
+                heaviest = maximum(m, heaviest)
+                for axis in range(3):
+                    write_parts(
+                        source, new, axis, 4 + axis, read(near, old + axis * many) - center[axis]
                     )
-        for row in range(5):
-            if row != 3:
-                for i in range(0, count, LANES):
-                    write(desk.total[row], i, read(desk.total[row], i) + read(part[row], i))
+            else:
+                for axis in range(3):
+                    write(source[axis], new, read(near, old + axis * many) + shift[axis])
+            write(source[3], new, m)
+        return largest(heaviest)
 
     @jit(flags=EXACT, numba=False)
     def sum_near(
         targets: Tree, sources: Tree, same: Any, cell: Any, low: Any, high: Any, limits: Limits,
         desk: Desk,
     ) -> None:  # fmt: skip
-        cells, bodies = sources.cells, sources.bodies
-        source, target, spans = desk.source, desk.target, desk.spans
-        new_x, new_y, new_z, new_m = source[0], source[1], source[2], source[3]
-        near = sources.near
-        x, y, z = targets.bodies[cell, X], targets.bodies[cell, Y], targets.bodies[cell, Z]
-        radius = targets.bodies[cell, RADIUS]
+        cells, bodies, near, spans = sources.cells, sources.bodies, sources.near, desk.spans
+        body = targets.bodies[cell]
+        x, y, z, radius = body[X], body[Y], body[Z], body[RADIUS]
         start = targets.cells[cell, START]
         count = targets.cells[cell, END] - start
-        for axis in range(3):
-            for i in range(0, count, LANES):
-                write(target[axis], i, read(targets.near, 4 * start + axis * count + i))
+        lay_out(targets, cell, desk)
         # Rounding is in proportion to the largest coordinate of what is summed together, and large
         # leaves around a small one would make it large for all: they are summed apart.
         least, reaches = 1e300, desk.reaches
@@ -138,7 +115,7 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
         border = WIDER * max(radius, least) if single else 1e300
         for wide in range(2):
             packed = pieces = 0
-            distance, own = radius, (0, 0, 0)
+            distance, heaviest, own = radius, nothing, (0, 0, 0)
             left = False
             for k in range(low, high):
                 leaf, reach = desk.candidates[k], reaches[k - low]
@@ -153,35 +130,33 @@ def near_field(law: str, real: type, potential: bool) -> Callable[..., Any]:
                         for i in range(count):
                             desk.total[4, i] += bodies[leaf, MASS] * (depth / limits.size)
                     continue
-                sx, sy, sz = nothing, nothing, nothing
+                shift = nothing, nothing, nothing
                 if single:
-                    sx, sy, sz = (
-                        real(bodies[leaf, X] - x), real(bodies[leaf, Y] - y),
-                        real(bodies[leaf, Z] - z),
+                    shift = (
+                        pairs(bodies[leaf, X] - x), pairs(bodies[leaf, Y] - y),
+                        pairs(bodies[leaf, Z] - z),
                     )  # fmt: skip
                 while first < last:
-                    taken = min(last - first, SOURCES - packed)
+                    taken = min(last - first, most_sources - packed)
                     distance = max(distance, reach)
                     if itself:
                         own = (first - start, first - start + taken, packed - (first - start))
-                    # The last lanes may hold more than this leaf; what follows overwrites them.
-                    for i in range(0, taken, LANES):
-                        old = place + i
-                        write(new_x, packed + i, read(near, old) + sx)
-                        write(new_y, packed + i, read(near, old + many) + sy)
-                        write(new_z, packed + i, read(near, old + 2 * many) + sz)
-                        write(new_m, packed + i, read(near, old + 3 * many))
+                    heavy = pack(near, place, many, taken, (x, y, z), shift, packed, desk)
+                    heaviest = max(heaviest, heavy)
                     spans[pieces, 0], spans[pieces, 1] = first, first + taken
                     pieces, packed = pieces + 1, packed + taken
                     first, place = first + taken, place + taken
-                    if packed == SOURCES:
+                    if packed == most_sources:
                         sum_packed(
-                            targets, sources, cell, packed, pieces, distance, own, limits, desk
-                        )
+                            targets, sources, cell, packed, pieces, distance, heaviest, own,
+                            limits, desk,
+                        )  # fmt: skip
                         packed = pieces = 0
-                        distance, own = radius, (0, 0, 0)
+                        distance, heaviest, own = radius, nothing, (0, 0, 0)
             if packed > 0:
-                sum_packed(targets, sources, cell, packed, pieces, distance, own, limits, desk)
+                sum_packed(
+                    targets, sources, cell, packed, pieces, distance, heaviest, own, limits, desk
+                )
             if not left:
                 break
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from motes.machine.traced import LANES
 from motes.memory import LINE, afford, budget
 
 KEPT = 1 / 8
@@ -34,6 +35,11 @@ class Room:
             first = -whole.ctypes.data % LINE
             piece = self._pieces[name] = whole[first : first + size + size // 16]
         return piece[:size].view(dtype).reshape(shape)
+
+    def columns(self, name: str, rows: int, count: int) -> Any:
+        """An array (rows, count) of doubles of which lanes may read on past the end."""
+        size = rows * count
+        return self.array(name, (size + LANES,))[:size].reshape(rows, count)
 
     @property
     def size(self) -> int:

@@ -18,6 +18,9 @@ EVERY = 160
 LEAVES = 16
 """Target leaves in the first class of the sample: those of the largest radius, all of them."""
 
+CROWDED = 1 / LEAVES
+"""Share of the targets from which a leaf is in the first class as well: a pile at one place."""
+
 LEAVES_OF_A_CLASS = 6
 """Fewest target leaves out of each further class, which has twice as many as the one before."""
 
@@ -28,8 +31,8 @@ targets: where most are, a few leaves would leave the mean uncertain."""
 LARGEST = 4.0
 """Times by which a value may be larger than is usual before it is taken for that."""
 
-DEVIATIONS = 2.5
-"""Standard errors of a mean square by which it may be larger than the sample says."""
+DEVIATIONS = 3.0
+"""Standard errors of a ratio of mean squares by which it may be larger than the sample says."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +50,8 @@ class Sample:
     chance: NDArray[np.float64]
     """(c,) share of the leaves of a class that were not chosen."""
 
-    def mean_of_most(self, values: NDArray[np.float64]) -> float:
-        """Mean with none larger than LARGEST times that of most: of all but the largest sixteenth
+    def usual(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values, none larger than LARGEST times the mean of most: of all but the largest sixteenth
         of those that are not zero.
 
         Close pairs and large masses may dominate means of few targets by chance, which would allow
@@ -57,11 +60,16 @@ class Sample:
         order = np.argsort(values)
         order = order[values[order] > 0.0]
         if not len(order):
-            return 0.0
+            return values
         share = np.cumsum(self.weight[order])
         most = order[share <= max(share[-1] * 15 / 16, share[0])]
         usual = (self.weight[most] * values[most]).sum() / self.weight.sum()
-        return float(np.average(np.minimum(values, LARGEST * usual), weights=self.weight))
+        few_are_larger: NDArray[np.float64] = np.minimum(values, LARGEST * usual)
+        return few_are_larger
+
+    def mean_of_most(self, values: NDArray[np.float64]) -> float:
+        """Mean of values as far as they are usual."""
+        return float(np.average(self.usual(values), weights=self.weight))
 
     def typical(self, values: NDArray[np.float64]) -> float:
         """Root mean square of most values."""
@@ -72,20 +80,25 @@ class Sample:
     ) -> float:
         """Largest likely rms error, in units of what is typical, without large values' rounding.
 
-        The mean square over all is that of the sample within its standard error, which follows from
-        how much leaves of one class differ.
+        The ratio of mean squares over all is that of the sample within its standard error, which
+        follows from how much leaves of one class differ in what they have more than this ratio.
         """
         more = np.maximum(np.abs(wrong) - rounding * values, 0.0)
         counts = self.ranges[:, 1] - self.ranges[:, 0]
-        sums = np.add.reduceat(self.weight * more**2, np.cumsum(counts) - counts)
+        typical = self.usual(values**2)
+        errors, scale = (float((self.weight * v).sum()) for v in (more**2, typical))
+        if scale == 0.0:
+            return 0.0
+        ratio = errors / scale
+        apart = self.weight * (more**2 - ratio * typical)
+        sums = np.add.reduceat(apart, np.cumsum(counts) - counts)
         variance = 0.0
         for first, last, chance in zip(
             self.classes[:-1], self.classes[1:], self.chance, strict=True
         ):
             if chance:
                 variance += chance * (last - first) * sums[first:last].var(ddof=1)
-        square = (sums.sum() + DEVIATIONS * math.sqrt(variance)) / self.weight.sum()
-        return math.sqrt(square) / (self.typical(values) or math.inf)
+        return math.sqrt(ratio + DEVIATIONS * math.sqrt(variance) / scale)
 
     def drift(self, wrong: NDArray[np.float64], values: NDArray[np.float64]) -> float:
         """Sum of vectors (3, n) over all, as a share of the sum of values."""
@@ -99,11 +112,13 @@ def sample_of(tree: Tree) -> Sample:
     Those chosen from a class are far from each other along the tree's curve.
     """
     leaves, cells, targets = tree.leaves, tree.cells, tree.place.shape[1]
-    sizes = [LEAVES << k for k in range(32 if len(leaves) > EVERY else 0)]
-    borders = [size for size in sizes if size < len(leaves)]
-    if borders:
-        leaves = leaves[np.argpartition(-tree.bodies[leaves, RADIUS], borders)]
+    classes = [LEAVES << k for k in range(32 if len(leaves) > EVERY else 0)]
+    borders = [size for size in classes if size < len(leaves)]
     held = cells[leaves, END] - cells[leaves, START]
+    if borders:
+        sizes = np.where(held > CROWDED * targets, np.inf, tree.bodies[leaves, RADIUS])
+        order = np.argpartition(-sizes, borders)
+        leaves, held = leaves[order], held[order]
     by_share = max(LEAVES_BY_SHARE, len(leaves) // ONE_IN)
     chosen, weights, chances = [], [], []
     for first, last in zip([0, *borders], [*borders, len(leaves)], strict=True):
@@ -118,5 +133,5 @@ def sample_of(tree: Tree) -> Sample:
         chances.append(1 - number / len(some))
     ranges: Any = cells[np.concatenate(chosen), :2].astype(np.int64)
     rows = np.concatenate([np.arange(*r) for r in ranges])
-    classes = np.cumsum([0, *map(len, chosen)])
-    return Sample(ranges, rows, np.concatenate(weights), classes, np.array(chances))
+    begins = np.cumsum([0, *map(len, chosen)])
+    return Sample(ranges, rows, np.concatenate(weights), begins, np.array(chances))

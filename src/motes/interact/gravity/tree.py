@@ -71,6 +71,8 @@ class Tree(NamedTuple):
     particles, then all y, z and m, from 4 START on, so that few lines of memory hold them."""
     moments: NDArray[Any]
     """(cells, padded basis)"""
+    rounded: NDArray[Any]
+    """The same in single precision, where it is wanted."""
 
 
 @jit(inline=True)
@@ -264,6 +266,7 @@ def octree(
         place,
         nothing,
         nothing,
+        nothing,
     )
 
 
@@ -275,7 +278,7 @@ def regrown(
     `like` has an order, cells, leaves, and the most particles in one.
     """
     room = room or Room()
-    place = room.array("place", (4, len(points)))
+    place = room.columns("place", 4, len(points))
     given = points, mass, box.origin, box.length, box.mass, like.order, place
     each(_permute, given, blocks(len(points), BLOCK))
     nothing = np.empty((0, 0))
@@ -287,6 +290,7 @@ def regrown(
         nothing,
         like.order,
         place,
+        nothing,
         nothing,
         nothing,
     )

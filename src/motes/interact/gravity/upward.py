@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from motes.interact.gravity.lanes import LANES, maximum, read, spread, write
 from motes.interact.gravity.morton import LEVELS
 from motes.interact.gravity.room import Room
-from motes.interact.gravity.translations import padded, translations
+from motes.interact.gravity.translations import FAMILY, padded, translations, width
 from motes.interact.gravity.tree import (
     BALL,
     BALL_RADIUS,
@@ -36,7 +36,7 @@ from motes.interact.gravity.tree import (
     cell_unit,
 )
 from motes.jit import EXACT, each, jit
-from motes.machine.lanes import choose, largest, total
+from motes.machine.lanes import choose, largest, take, total
 
 TASKS, PARTICLES_OF_A_TASK = 64, 4096
 """Parts of the upward pass, at most, and particles of a part at least."""
@@ -73,6 +73,8 @@ def _measurer(order: int) -> Callable[..., None]:
         xs, ys, zs = place[0, start:end], place[1, start:end], place[2, start:end]
         ms = place[3, start:end]
         whole = xs.size // LANES * LANES
+        # From the first particle on: where all are at one place, so is their center, to the bit.
+        x0, y0, z0 = xs[0], ys[0], zs[0]
         x = y = z = mass = 0.0
         if number == 0:
             sum_x, sum_y, sum_z, sum_m = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
@@ -80,27 +82,27 @@ def _measurer(order: int) -> Callable[..., None]:
                 m = read(ms, i)
                 weight = m + LIGHT
                 sum_m = sum_m + m
-                sum_x = sum_x + weight * read(xs, i)
-                sum_y = sum_y + weight * read(ys, i)
-                sum_z = sum_z + weight * read(zs, i)
+                sum_x = sum_x + weight * (read(xs, i) - x0)
+                sum_y = sum_y + weight * (read(ys, i) - y0)
+                sum_z = sum_z + weight * (read(zs, i) - z0)
             x, y, z, mass = total(sum_x), total(sum_y), total(sum_z), total(sum_m)
             for i in range(whole, xs.size):
                 m = ms[i]
                 mass += m
                 m += LIGHT
-                x += m * xs[i]
-                y += m * ys[i]
-                z += m * zs[i]
+                x += m * (xs[i] - x0)
+                y += m * (ys[i] - y0)
+                z += m * (zs[i] - z0)
         else:
             for child in range(first_child, first_child + number):
                 m = bodies[child, MASS]
                 mass += m
                 m += LIGHT * (cells[child, END] - cells[child, START])
-                x += m * bodies[child, X]
-                y += m * bodies[child, Y]
-                z += m * bodies[child, Z]
+                x += m * (bodies[child, X] - x0)
+                y += m * (bodies[child, Y] - y0)
+                z += m * (bodies[child, Z] - z0)
         weights = mass + LIGHT * (end - start)
-        x, y, z = x / weights, y / weights, z / weights
+        x, y, z = x0 + x / weights, y0 + y / weights, z0 + z / weights
         r2, radius, spread_out = 0.0, 0.0, 0.0
         if number == 0 or end - start <= MANY:
             far, sums = spread(0.0), spread(0.0)
@@ -153,13 +155,13 @@ def _approach(tree: Tree, cell: Any, relative: bool) -> None:
 
 
 @cache
-def _summation(order: int, harmonic: bool) -> Callable[..., None]:
+def _summation(order: int, harmonic: bool, real: type) -> Callable[..., None]:
     """Compiled function that fills in bodies, near and moments of some branches.
 
     (tree, branches, relative, ascending, first, last) -> None: `branches` (k, 2) from `first` to
     `last`, each a cell and the row after the last of its descendants.
     """
-    operations = translations(order, harmonic)
+    operations, lanes = translations(order, harmonic, real), width(real)
     particles_to_moments = operations.particles_to_moments
     sums_to_moments = operations.sums_to_moments
     moments_to_moments, every = operations.moments_to_moments, operations.every
@@ -174,14 +176,14 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
         scale, zero = kind(1.0 / cell_unit(body[RADIUS])), kind(0)
         sums[:] = 0
         count = end - start
-        for first in range(0, count, LANES):
-            inside = read(ascending, 0) < np.int32(count - first)
+        for first in range(0, count, lanes):
+            inside = take(ascending, 0, lanes) < np.int32(count - first)
             row = 4 * start + first
             for axis in range(3):
                 center = kind(0.0 if relative else body[axis])
-                given = choose(inside, read(near, row + axis * count), center)
+                given = choose(inside, take(near, row + axis * count, lanes), center)
                 write(place[axis], 0, (center - given) * scale)
-            write(place[3], 0, choose(inside, read(near, row + 3 * count), zero))
+            write(place[3], 0, choose(inside, take(near, row + 3 * count, lanes), zero))
             particles_to_moments(place, sums)
         sums_to_moments(sums, tree.moments[cell])
 
@@ -191,7 +193,7 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
         first, number = tree.cells[cell, FIRST], tree.cells[cell, NUMBER]
         body = bodies[cell]
         scale = 1.0 / cell_unit(body[RADIUS])
-        for lane in range(LANES):
+        for lane in range(FAMILY):
             child = first + lane
             chosen[lane] = first
             place[3, lane] = 0.0
@@ -209,9 +211,10 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
         tree: Tree, branches: Any, relative: bool, ascending: Any, first: Any, last: Any
     ) -> None:
         kind = tree.near.dtype.type
-        place, sums = np.empty((5, LANES), kind), np.empty((every, LANES), kind)
-        chosen = np.zeros(LANES, np.int32)
+        place, sums = np.empty((5, lanes), kind), np.empty((every, lanes), kind)
+        children, chosen = np.empty((5, FAMILY), kind), np.zeros(FAMILY, np.int32)
         place[:] = 1
+        children[:] = 1
         for branch in range(first, last):
             top, end = branches[branch, 0], branches[branch, 1]
             under = end - tree.cells[top, FIRST]
@@ -225,20 +228,27 @@ def _summation(order: int, harmonic: bool) -> Callable[..., None]:
                     if is_leaf:
                         moments_of_leaf(tree, cell, relative, place, ascending, sums)
                     else:
-                        moments_of_parent(tree, cell, place, chosen)
+                        moments_of_parent(tree, cell, children, chosen)
                     # Single precision would lose digits of the sum of many equal masses.
                     tree.moments[cell, 0] = tree.bodies[cell, MASS]
+                    if tree.rounded.shape[0] > 0:
+                        for k in range(tree.rounded.shape[1]):
+                            tree.rounded[cell, k] = tree.moments[cell, k]
 
     return fill  # type: ignore[no-any-return]
 
 
 def summarize(
-    tree: Tree, order: int, harmonic: bool, real: type, sources: bool, room: Room | None = None
-) -> Tree:
-    """The tree with bodies, and for `sources` moments, filled in from places and masses."""
+    tree: Tree, order: int, harmonic: bool, real: type, sources: bool, room: Room | None = None,
+    mixed: bool = False,
+) -> Tree:  # fmt: skip
+    """The tree with bodies, and for `sources` moments, filled in from places and masses.
+
+    `mixed`: with moments in single precision as well.
+    """
     room = room or Room()
     branches, stem = divide_work(tree)
-    operations, fill = translations(order, harmonic), _summation(order, harmonic)
+    operations, fill = translations(order, harmonic, real), _summation(order, harmonic, real)
     n, rows = tree.place.shape[1], len(tree.cells) + LANES
     near = room.array("records", (4 * n + LANES,), real)
     near[-LANES:] = 0
@@ -247,7 +257,9 @@ def summarize(
     count = len(tree.cells) + 1 if sources else 0
     moments = room.array("moments", (count, padded(operations.basis)), real)
     moments[-1:] = 0  # Of rows that lanes which are left over are about.
-    tree = tree._replace(moments=moments, near=near, balls=balls)
+    rounded = room.array("rounded", moments.shape if mixed else (0, 0), np.float32)
+    rounded[-1:] = 0
+    tree = tree._replace(near=near, balls=balls, moments=moments, rounded=rounded)
     relative, ascending = real is np.float32, np.arange(LANES, dtype=np.int32)
     tasks = min(max(n // PARTICLES_OF_A_TASK, 1), TASKS)
     cuts = np.searchsorted(tree.cells[branches[:, 0], START], np.arange(tasks + 1) * n / tasks)

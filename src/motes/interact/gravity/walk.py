@@ -17,9 +17,10 @@ import numpy as np
 
 from motes.interact.gravity.acceptance import acceptance, seen
 from motes.interact.gravity.desk import Desk, Limits
+from motes.interact.gravity.far import far_field, together
 from motes.interact.gravity.lanes import LANES, read, write
 from motes.interact.gravity.near import near_field
-from motes.interact.gravity.translations import Translations, translations
+from motes.interact.gravity.translations import translations, width
 from motes.interact.gravity.tree import (
     BALL,
     BALL_RADIUS,
@@ -39,7 +40,7 @@ from motes.interact.gravity.tree import (
     cell_unit,
 )
 from motes.jit import EXACT, jit
-from motes.machine.lanes import bits, choose, fetch, lowest, put_some
+from motes.machine.lanes import bits, choose, fetch, lowest, put_some, take
 from motes.memory import LINE
 
 LARGE = 64
@@ -48,21 +49,6 @@ time."""
 
 OPENED = 1.25
 """Radius of a source cell, in radii of the target cell, from which it is divided first."""
-
-
-def _expander(operations: Translations) -> Callable[..., None]:
-    """Compiled function that adds the local terms of the first LANES or fewer cells of a list."""
-    moments_to_local = operations.moments_to_local
-
-    @jit(flags=EXACT, numba=False)
-    def expand(sources: Tree, own: Any, e2: Any, far: Any, count: Any, desk: Desk) -> None:
-        for lane in range(count, LANES):
-            far[lane] = sources.cells.shape[0]
-        moments_to_local(
-            sources.balls, far, own, sources.moments, e2, desk.places, desk.room, desk.gathered
-        )
-
-    return expand  # type: ignore[no-any-return]
 
 
 @jit(inline=True)
@@ -79,8 +65,10 @@ def _is_wanted(ranges: Any, start: Any, end: Any) -> Any:
 
 
 @cache
-def walker(law: str, real: type, potential: bool, order: int, low_order: int) -> Callable[..., Any]:
-    """Compiled walk for a pair law, numbers of type `real`, with or without the potential.
+def walker(
+    law: str, real: type, mixed: bool, potential: bool, order: int, low_order: int
+) -> Callable[..., Any]:
+    """Compiled walk for a pair law, numbers of type `real` or `mixed`, with the potential or not.
 
     (targets, sources, same, ranges, limits, desk, out) -> int: writes to rows 0 to 2 of `out`
     (4, n) the sums of m s dx, and with `potential` to row 3 those of m w, for the particles of
@@ -89,15 +77,16 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
     among its own sources. Source cells whose expansion of order `low_order` is enough are taken
     with that.
     """
-    sum_near = near_field(law, real, potential)
+    sum_near = near_field(law, real, mixed, potential)
     harmonic = law != "plummer"
-    operations = translations(order, harmonic)
+    operations, particles = translations(order, harmonic, real), width(real)
     local_to_local, basis = operations.local_to_local, operations.basis
-    is_large, of_a_line = basis > LARGE, LINE // np.dtype(real).itemsize
     lanes_to_local, local_to_particles = operations.lanes_to_local, operations.local_to_particles
-    expand = _expander(operations)
-    expand_easily = _expander(translations(low_order, harmonic))
-    is_far = acceptance(order, low_order, real)
+    high_to_local = translations(order, harmonic, np.float32).lanes_to_local
+    expand = far_field(order, harmonic, real, mixed)
+    expand_easily = far_field(low_order, harmonic, real, mixed)
+    is_far, batch = acceptance(order, low_order, real), together(real, mixed)
+    is_large, of_a_line = basis > LARGE, LINE // np.dtype(np.float32 if mixed else real).itemsize
     single, nothing = real is np.float32, real(0)
 
     @jit(flags=EXACT, numba=False)
@@ -116,12 +105,15 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
         count = targets.cells[cell, END] - targets.cells[cell, START]
         is_leaf = targets.cells[cell, NUMBER] == 0
         allowed = min(limits.error, limits.force / max(targets.bodies[cell, MASS], 1e-300))
+        allowed = min(allowed, limits.alike / np.sqrt(np.float64(count)))
         allowed = max(allowed, real(1e-30))
         stricter = real(1.0 / allowed), real(limits.easier / allowed)
         few = real(limits.few // count)
         ascending = read(desk.ascending, 0)
         opening2, reach = real(limits.opening2), real(limits.reach)
         desk.gathered[:] = 0
+        if mixed:
+            desk.high[:] = 0
         top, depth, accepted, easily = high, 0, 0, 0
         while depth > 0 or low < high:
             # What is not tested in this round is left on the stack of cells to test.
@@ -158,7 +150,10 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
             if is_large:
                 for k in range(accepted, accepted + more):
                     for part in range(0, basis, of_a_line):
-                        fetch(sources.moments[far[k]], part)
+                        if mixed:
+                            fetch(sources.rounded[far[k]], part)
+                        else:
+                            fetch(sources.moments[far[k]], part)
             accepted += more
             easily += put_some(easy, easily, some, separate & low_order_does)
             top += put_some(candidates, top, some, remain & ~divides)
@@ -175,15 +170,15 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
                     fetch(sources.balls, BALL * child)
                 fetch(sources.cells, 4 * first)
                 fetch(sources.cells, 4 * last - 1)
-            if accepted >= LANES:
-                expand(sources, own, e2, far, LANES, desk)
-                accepted -= LANES
-                write(far, 0, read(far, LANES))
-            if easily >= LANES:
-                expand_easily(sources, own, e2, easy, LANES, desk)
-                easily -= LANES
-                write(easy, 0, read(easy, LANES))
-        if accepted > 0 and accepted + easily <= LANES:
+            while accepted >= batch:
+                expand(sources, own, e2, far, batch, desk)
+                accepted -= batch
+                write(far, 0, read(far, batch))
+            while easily >= batch:
+                expand_easily(sources, own, e2, easy, batch, desk)
+                easily -= batch
+                write(easy, 0, read(easy, batch))
+        if accepted > 0 and accepted + easily <= batch:
             for lane in range(easily):
                 far[accepted + lane] = easy[lane]
             accepted, easily = accepted + easily, 0
@@ -198,7 +193,7 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
         targets: Tree, cell: Any, ranges: Any, low: Any, high: Any, depth: Any, desk: Desk
     ) -> Any:
         """Put a cell's children that own targets in `ranges` on the stack."""
-        place, cells, bodies = desk.place, targets.cells, targets.bodies
+        place, cells, bodies = desk.children, targets.cells, targets.bodies
         scale = 1.0 / cell_unit(bodies[cell, RADIUS])
         lane = 0
         for child in range(cells[cell, FIRST], cells[cell, FIRST] + cells[cell, NUMBER]):
@@ -221,15 +216,15 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
         start, end = targets.cells[cell, START], targets.cells[cell, END]
         scale = real(1.0 / cell_unit(body[RADIUS]))
         count = end - start
-        for first in range(0, count, LANES):
+        for first in range(0, count, particles):
             for axis in range(3):
                 center = real(0.0 if single else body[axis])
-                near = read(targets.near, 4 * start + axis * count + first)
+                near = take(targets.near, 4 * start + axis * count + first, particles)
                 write(place[axis], 0, (near - center) * scale)
             local_to_particles(place, terms, scale, out)
             for axis in range(3):
-                write(total[axis], first, read(out[axis], 0))
-            write(total[4], first, read(out[3], 0))
+                write(total[axis], first, take(out[axis], 0, particles))
+            write(total[4], first, take(out[3], 0, particles))
 
     @jit(flags=EXACT, numba=False)
     def walk(
@@ -247,6 +242,8 @@ def walker(law: str, real: type, potential: bool, order: int, low_order: int) ->
             if top < 0:
                 return 1
             lanes_to_local(desk.gathered, desk.local[depth])
+            if mixed:
+                high_to_local(desk.high, desk.local[depth])
             if targets.cells[cell, NUMBER] > 0:
                 depth = wait(targets, cell, ranges, high, top, depth, desk)
                 continue
