@@ -26,9 +26,6 @@ from motes.machine.lanes import choose, total
 ROUNDING = 6e-8
 """Change of a difference of coordinates by single precision, in units of the largest of them."""
 
-IN_PARTS = ROUNDING**2
-"""The same of coordinates in two parts."""
-
 OF_A_PULL = 1e-7
 """Error of one pull in single precision, in parts of it, where coordinates are exact."""
 
@@ -46,8 +43,7 @@ def packed_sum(law: str, real: type, mixed: bool, potential: bool) -> Callable[.
     attract = attraction(law, pairs, potential, bound=single or mixed, fine=mixed)
     attract_roughly = attraction(law, pairs, potential, bound=single, rough=single)
     exact, depth = pair_law(law, np.float64), center_depth(law, 1.0)
-    rounding, cube_of_pull = IN_PARTS if mixed else ROUNDING, OF_A_PULL**3
-    nothing = pairs(0)
+    cube_of_pull, nothing = OF_A_PULL**3, pairs(0)
 
     @jit(flags=EXACT, numba=False)
     def sum_exactly(
@@ -72,11 +68,12 @@ def packed_sum(law: str, real: type, mixed: bool, potential: bool) -> Callable[.
     def is_spoiled(part: Any, blur: Any, heaviest: Any, limit: Any) -> Any:
         """Whether sums (5,) over sources, the largest m s among them, may be wrong by the limit."""
         x, most = part[0], np.float64(part[3])
-        spoiled = not blur * most <= limit or x != x
         if mixed:
             # s <= 1 / r^3, so that no pull is larger than (m (m s)^2)^(1/3).
-            spoiled |= not cube_of_pull * heaviest * most * most <= limit * limit * limit
-        return spoiled
+            is_good = cube_of_pull * heaviest * most * most <= limit * limit * limit
+        else:
+            is_good = blur * most <= limit
+        return not is_good or x != x or most - most != 0.0
 
     @jit(flags=EXACT, numba=False)
     def sum_packed(
@@ -101,7 +98,7 @@ def packed_sum(law: str, real: type, mixed: bool, potential: bool) -> Callable[.
             attract(desk.target, count, source, packed, own, size, part)
         if single or mixed:
             # Twice the change of s dx by coordinates that are wrong by a little.
-            blur = 2.0 * rounding * (distance + targets.bodies[cell, RADIUS])
+            blur = 2.0 * ROUNDING * (distance + targets.bodies[cell, RADIUS])
             for i in range(count):
                 if potential and own[0] <= i < own[1] and depth > 0.0:
                     part[4, i] += targets.near[4 * start + 3 * count + i] * (depth / limits.size)
