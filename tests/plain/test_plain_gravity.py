@@ -1,6 +1,9 @@
 """Gravity as its definition says: a double loop, in double precision."""
 
 import math
+import os
+import subprocess
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -87,3 +90,26 @@ def test_every_number_of_particles_is_summed(count):
         a, phi = gravity.field(x, m, **options)
         np.testing.assert_allclose(a, plain_a, rtol=1e-12, atol=1e-13)
         np.testing.assert_allclose(phi, plain_phi, rtol=1e-12, atol=1e-13)
+
+
+PROGRAM = """
+import numpy as np
+from motes import gravity
+
+rng = np.random.default_rng(0)
+x, m = rng.normal(size=(150, 3)), rng.random(150)
+for kernel in ("spline", "plummer"):
+    law = {"softening": 0.05, "softening_kernel": kernel}
+    exact = gravity.acceleration(x, m, **law)
+    for tolerance in (1e-3, 1e-5, 1e-7, 1e-9):
+        a = gravity.acceleration(x, m, tolerance=tolerance, method="multipole", **law)
+        assert ((a - exact) ** 2).sum() < tolerance**2 * (exact**2).sum(), (kernel, tolerance)
+"""
+
+
+def test_plain_python_runs_the_multipole_method_as_machine_code_does():
+    """All its precisions, without a compiler, and without a warning."""
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONWARNINGS": "error"}
+    run = [sys.executable, "-c", PROGRAM]
+    done = subprocess.run(run, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -13,8 +13,15 @@ import numpy as np
 
 
 def take(array: Any, place: Any, lanes: int) -> Any:
-    """Elements of an array of one axis, from `place` on, one for each of `lanes` (a literal)."""
-    return array[place] if lanes == 1 else array[place : place + lanes].copy()
+    """Elements of an array of one axis, from `place` on, one for each of `lanes` (a literal).
+
+    A kernel reads on past the end, where its memory has to go on; plain Python takes zeros there.
+    """
+    if lanes == 1:
+        return array[place]
+    found, some = np.zeros(lanes, array.dtype), array[place : place + lanes]
+    found[: len(some)] = some
+    return found
 
 
 def put(array: Any, place: Any, value: Any) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -93,4 +94,7 @@ def attraction(
             if potential:
                 out[4, i] += total(sum_w)
 
+    if isinstance(attract, FunctionType):
+        # Plain Python: as in machine code, what overflows or is 0 / 0 is no fault.
+        return np.errstate(all="ignore")(attract)
     return attract  # type: ignore[no-any-return]

@@ -164,7 +164,8 @@ def _summation(order: int, harmonic: bool, real: type) -> Callable[..., None]:
     operations, lanes = translations(order, harmonic, real), width(real)
     particles_to_moments = operations.particles_to_moments
     sums_to_moments = operations.sums_to_moments
-    moments_to_moments, every = operations.moments_to_moments, operations.every
+    moments_to_moments = operations.moments_to_moments
+    every, basis = operations.every, operations.basis
     measure = _measurer(order)
 
     @jit(flags=EXACT, numba=False)
@@ -232,7 +233,7 @@ def _summation(order: int, harmonic: bool, real: type) -> Callable[..., None]:
                     # Single precision would lose digits of the sum of many equal masses.
                     tree.moments[cell, 0] = tree.bodies[cell, MASS]
                     if tree.rounded.shape[0] > 0:
-                        for k in range(tree.rounded.shape[1]):
+                        for k in range(basis):
                             tree.rounded[cell, k] = tree.moments[cell, k]
 
     return fill  # type: ignore[no-any-return]
