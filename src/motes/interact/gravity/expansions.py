@@ -178,6 +178,7 @@ def without_first(basis: tuple[Index, ...]) -> list[Index]:
     return [b for b in basis if sum(b) != 1]
 
 
+@cache
 def places(harmonic: bool) -> list[int]:
     """Rows of D_b for the terms of `without_first`, which are the same for all orders."""
     return [row_of(b, harmonic) for b in without_first(terms(SIDE[harmonic] - 1, harmonic).basis)]
