@@ -79,3 +79,9 @@ def test_local_terms_are_the_sums_of_moments_times_derivatives(order, harmonic, 
             if sum(b) != 1 and above < sum(a) + sum(b) <= order
         ) * (own[6] / r) ** sum(a)
         np.testing.assert_allclose(local[n], exact, rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize(("order", "harmonic"), [(15, True), (9, False)])
+def test_an_order_whose_derivatives_have_no_rows_is_refused(order, harmonic):
+    with pytest.raises(ValueError, match=f"at most {order - 1}"):
+        moments_to_local(order, harmonic, np.float64)

@@ -8,6 +8,7 @@ from typing import Any
 
 from motes.interact.gravity.expansions import (
     MOMENTS,
+    SIDE,
     derivatives,
     plus,
     powers,
@@ -48,7 +49,11 @@ def moments_to_local(
     around centers of mass. `room` (ROOM, width) is written to: derivatives where `row_of` says, and
     scaled moments, whose products are summed in loops; `places` are those of the harmonic kind or
     not. Balls may be in double precision where `real` is single.
+
+    Raises ValueError for an order whose derivatives have no rows.
     """
+    if order >= SIDE[harmonic]:
+        raise ValueError(f"order = {order} must be at most {SIDE[harmonic] - 1}.")
     kind, lanes = terms(order, harmonic), width(real)
     basis = kind.basis
     others = without_first(basis)
